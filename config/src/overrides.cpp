@@ -162,8 +162,8 @@ std::vector<EnvironmentKey> environment_keys(const std::vector<SectionDoc>& sect
 
 /// Variables that programs of this repository read themselves: the folder of the data files, and
 /// settings of its tests and scripts.
-constexpr std::array<std::string_view, 4> kOwnVariables{"EMIT_DATA_DIR", "EMIT_SOAK_S",
-                                                        "EMIT_TIDY_JOBS", "EMIT_UPDATE_GOLDENS"};
+constexpr std::array<std::string_view, 5> kOwnVariables{
+    "EMIT_DATA_DIR", "EMIT_PEERS_DIR", "EMIT_SOAK_S", "EMIT_TIDY_JOBS", "EMIT_UPDATE_GOLDENS"};
 
 /// A misspelt variable would otherwise change nothing without a word. One environment serves
 /// scenario and daemon, so that the keys of both are known here.

@@ -8,8 +8,9 @@
 
 #include "agents/gateway/gateway_setup.hpp"
 #include "agents/motion/motion_setup.hpp"
-#include "app/replay.hpp"
+#include "app/recording.hpp"
 #include "emit/physics/check.hpp"
+#include "emit/v1/control.pb.h"
 
 namespace emit::server {
 namespace {
@@ -70,13 +71,18 @@ physics::Result<Recorder::Opened> AgentSet::make_recorder(const ProcessNames& na
   identity.device = names.device;
   identity.pacing = names.pacing;
   identity.first_time_ns = config_.source.first_time_ns;
+  std::optional<ScenarioIdentity> of_scenario;
   if (scenario_) {
-    auto hash = scenario_sha256(*scenario_);
-    if (!hash) {
-      return tl::unexpected<Error>(std::move(hash.error()));
+    auto identified = identify_scenario(*scenario_);
+    if (!identified) {
+      return tl::unexpected<Error>(std::move(identified.error()));
     }
-    identity.scenario_sha256 = std::move(*hash);
+    of_scenario = std::move(*identified);
+    identity.scenario_sha256 = of_scenario->sha256;
   }
+  v1::Recording recording;
+  fill(of_scenario ? &*of_scenario : nullptr, &config_, context_.channels, recording);
+  recording.SerializeToString(&identity.recording);
   recorder_ = std::make_unique<Recorder>(context_, config_.journal, config_.control.max_clients);
   recorder_->set_identity(std::move(identity));
   auto opened = recorder_->open();

@@ -51,6 +51,7 @@ class AgentSet {
   [[nodiscard]] physics::Result<void> start_render(FrameSourceFactory factory);
   /// Makes the recorder and opens the journal. Errors: config (the disk leaves no room), io (the
   /// journal or a file of the scenario), parse (a glTF file).
+  /// @pre context.channels is filled
   [[nodiscard]] physics::Result<Recorder::Opened> make_recorder(const ProcessNames& names);
   /// Makes the sender, and the shared memory where stream.shm asks for it. Errors: io.
   /// @pre start_render() succeeded

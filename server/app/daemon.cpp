@@ -11,6 +11,7 @@
 
 #include "app/daemon_impl.hpp"
 #include "app/privileges.hpp"
+#include "app/recording.hpp"
 #include "emit/version.hpp"
 #include "net/key_file.hpp"
 
@@ -137,8 +138,7 @@ physics::Result<void> DaemonImpl::make_agents() {
   }
   context_.channels = std::move(channels->channels);
   context_.pictures = std::move(channels->pictures);
-  const ProcessNames names{fmt::format("emitd {} ({})", kVersion, kCommit),
-                           scenario_ ? scenario_->name : std::string(),
+  const ProcessNames names{build_text("emitd"), scenario_ ? scenario_->name : std::string(),
                            std::string(pacing_name(config_.pacing.mode)), source.device};
   agents_.receiver().set_identity({names.software, names.scenario, names.pacing, names.device});
   auto journal = agents_.make_recorder(names);

@@ -87,11 +87,4 @@ class JournalPlayer {
   std::string device_;
 };
 
-/// Returns the identity of a resolved scenario as RunStart has it, a SHA-256 in hex. It covers the
-/// resolved values, with the tables that the scenario names, the glTF files and their buffers.
-/// Files count by their path relative to the scenario file, so the result is the same in every
-/// folder on every machine. Errors (io): a file that cannot be read, by name; (parse): a glTF file
-/// whose JSON is invalid.
-[[nodiscard]] physics::Result<std::string> scenario_sha256(const scene::ScenarioDesc& scenario);
-
 }  // namespace emit::server

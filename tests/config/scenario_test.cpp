@@ -284,6 +284,35 @@ TEST_F(ConfigTest, a_printed_scenario_loads_to_the_same_values) {
   EXPECT_EQ(second->materials[0].modes[0].tau_s, first->materials[0].modes[0].tau_s);
 }
 
+TEST_F(ConfigTest, every_listed_value_is_an_override_that_changes_nothing) {
+  const auto first = scenario(kFull);
+  ASSERT_TRUE(first.has_value()) << first.error().text;
+  const std::string printed = print_scenario(*first);
+  const auto file = write("printed.toml", printed);
+  const std::vector<ConfigValue> values = list_values(printed);
+  EXPECT_GT(values.size(), 60U);
+  for (const ConfigValue& one : values) {
+    const std::vector<std::string> overrides{one.key + "=" + one.value};
+    const auto again = load_scenario(file, overrides, options_);
+    ASSERT_TRUE(again.has_value()) << overrides[0] << "\n" << again.error().text;
+    EXPECT_EQ(print_scenario(*again), printed) << overrides[0];
+  }
+}
+
+TEST(ListValues, elements_go_by_a_name_of_their_own) {
+  const auto values = list_values(
+      "name = \"a\"\n[place]\nlat_deg = 1.0\n[[object]]\nname = \"truck\"\nscale = 1.0\n"
+      "[[object]]\nname = \"twin\"\n[[object]]\nname = \"twin\"\n[[object]]\nname = \"7\"\n"
+      "[[band]]\nname = \"8-12\"\nresponse = [\n  { um = 8.0 },\n  { um = 12.0 },\n]\n");
+  std::vector<std::string> keys;
+  for (const ConfigValue& one : values) keys.push_back(one.key);
+  EXPECT_EQ(keys,
+            (std::vector<std::string>{"name", "place.lat_deg", "object[truck].name",
+                                      "object[truck].scale", "object[1].name", "object[2].name",
+                                      "object[3].name", "band[8-12].name", "band[8-12].response"}));
+  EXPECT_EQ(values.back().value, "[{ um = 8.0 }, { um = 12.0 },]");
+}
+
 TEST_F(ConfigTest, a_printed_weather_table_loads_to_the_same_values) {
   write("w.csv",
         "time_s,dni_w_m2,dhi_w_m2,longwave_down_w_m2,air_k,wind_m_s,cloud_frac,environment_k,"

@@ -172,6 +172,10 @@ TEST_F(PosePcap, ReadsEveryLinkLayer) {
   EXPECT_EQ(one(1, ethernet(v6, 0x86DD)), expected);
   EXPECT_EQ(one(1, ethernet(v4, 0x0800, big(0x81000005, 4))), expected);
   EXPECT_EQ(one(1, ethernet(v4, 0x0800, big(0x88A80005, 4) + big(0x81000006, 4))), expected);
+  const Octets three_tags = big(0x91000005, 4) + big(0x88A80005, 4) + big(0x81000006, 4);
+  EXPECT_EQ(one(1, ethernet(v6, 0x86DD, three_tags)), expected);
+  EXPECT_EQ(one(113, big(0, 14) + big(0x8100, 2) + big(0x0005'0800, 4) + v4), expected);
+  EXPECT_EQ(one(276, big(0x8100, 2) + big(0, 18) + big(0x0005'86DD, 4) + v6), expected);
   EXPECT_EQ(one(101, v4), expected);
   EXPECT_EQ(one(101, v6), expected);
   EXPECT_EQ(one(228, v4), expected);
@@ -241,14 +245,34 @@ TEST_F(PosePcap, RefusesFragmentsCutPacketsAndUnknownLinkLayers) {
   const Octets fragment = big(17, 1) + big(0, 1) + big(1, 2) + big(77, 4);
   out = read(pcap_header(false, false, 101) + pcap_record(false, ipv6(fragment + datagram, 44)));
   EXPECT_THAT(out.error, HasSubstr("packet 1: a datagram to port 7001 in IP fragments"));
-  // A later fragment has no ports, so it is skipped with the first one.
-  EXPECT_EQ(read(head + pcap_record(false, ethernet(ipv4(datagram, 0x0010)))).error, "");
+  // A later fragment has no ports: whose datagram it is part of is not known.
+  out = read(head + good + pcap_record(false, ethernet(ipv4(datagram, 0x0010))) +
+             pcap_record(false, ethernet(ipv4(datagram, 0x0020, 6))));
+  EXPECT_EQ(out.error, "");
+  EXPECT_EQ(out.frames, Frames{1});
+  EXPECT_THAT(out.notes, HasSubstr("1 later IP fragments of UDP datagrams"));
+  const Octets later = big(17, 1) + big(0, 1) + big(8, 2) + big(77, 4);
+  out = read(pcap_header(false, false, 101) + pcap_record(false, ipv6(later + datagram, 44)));
+  EXPECT_THAT(out.notes, HasSubstr("1 later IP fragments of UDP datagrams"));
   const Octets packet = ethernet(ipv4(datagram));
   out = read(head + pcap_record(false, packet.substr(0, 96), packet.size()));
   EXPECT_THAT(out.error,
               HasSubstr("only 96 of " + std::to_string(packet.size()) + " bytes were captured"));
   out = read(pcap_header(false, false, 127) + pcap_record(false, packet));
   EXPECT_THAT(out.error, HasSubstr("packet 1: link type 127 is not handled"));
+}
+
+TEST_F(PosePcap, NamesNetworkLayersThatItDoesNotRead) {
+  const Octets head = pcap_header(false, false, 1);
+  const Octets good = pcap_record(false, ethernet(ipv4(udp(host_frame(1)))));
+  const Octets pppoe = pcap_record(false, ethernet(Octets(40, '\1'), 0x8864));
+  const Octets tagged = pcap_record(false, ethernet(Octets(40, '\1'), 0x88E5, big(0x81000005, 4)));
+  const auto out = read(head + good + pppoe + tagged);
+  EXPECT_EQ(out.frames, Frames{1});
+  EXPECT_THAT(out.notes, HasSubstr("2 packets are neither IP nor ARP and are left out (packet 2: "
+                                   "Ethernet type 0x8864)"));
+  const Octets spanning_tree = pcap_record(false, ethernet(Octets(38, '\1'), 38));
+  EXPECT_EQ(read(head + good + spanning_tree).notes, "");
 }
 
 TEST_F(PosePcap, DamagedFilesAreErrorsWithTheirOffset) {

@@ -25,6 +25,7 @@ enum LinkType : std::uint32_t {
 
 constexpr std::uint16_t kEtherIpv4 = 0x0800;
 constexpr std::uint16_t kEtherIpv6 = 0x86DD;
+constexpr std::uint16_t kEtherArp = 0x0806;
 constexpr std::uint8_t kUdp = 17;
 constexpr std::size_t kUdpHeaderBytes = 8;
 
@@ -34,6 +35,12 @@ std::uint8_t u8(Bytes in, std::size_t at) noexcept {
 /// Reads a number in network byte order.
 std::uint16_t u16(Bytes in, std::size_t at) noexcept {
   return static_cast<std::uint16_t>(u8(in, at) << 8 | u8(in, at + 1));
+}
+
+CapturedDatagram later_fragment() noexcept {
+  CapturedDatagram out;
+  out.kind = Kind::later_fragment;
+  return out;
 }
 
 /// Reads the UDP datagram at the begin of `ip`. IP announces `length` bytes; `ip` may hold fewer.
@@ -67,7 +74,7 @@ CapturedDatagram ipv4(Bytes ip, std::uint64_t wire_bytes) noexcept {
   if (header < 20 || total < header || ip.size() < header || u8(ip, 9) != kUdp) return {};
   const std::uint16_t fragment = u16(ip, 6);
   const bool more = (fragment & 0x2000u) != 0;
-  if ((fragment & 0x1FFFu) != 0) return {};
+  if ((fragment & 0x1FFFu) != 0) return later_fragment();
   return udp(ip.first(std::min(ip.size(), total)).subspan(header), total - header, more);
 }
 
@@ -90,7 +97,8 @@ CapturedDatagram ipv6(Bytes ip, std::uint64_t wire_bytes) noexcept {
     if (next == 44) {
       bytes = 8;
       const std::uint16_t place = u16(rest, 2);
-      if ((place & 0xFFF8u) != 0) return {};
+      if ((place & 0xFFF8u) != 0)
+        return u8(rest, 0) == kUdp ? later_fragment() : CapturedDatagram();
       fragment = fragment || (place & 1u) != 0;
     } else if (next == 51) {
       bytes = 8 + std::size_t{4} * u8(rest, 1);
@@ -108,22 +116,34 @@ CapturedDatagram by_version(Bytes ip, std::uint64_t wire_bytes) noexcept {
   return u8(ip, 0) >> 4 == 6 ? ipv6(ip, wire_bytes) : ipv4(ip, wire_bytes);
 }
 
-CapturedDatagram by_ether_type(std::uint16_t type, Bytes ip, std::uint64_t wire_bytes) noexcept {
-  if (type == kEtherIpv4) return ipv4(ip, wire_bytes);
-  if (type == kEtherIpv6) return ipv6(ip, wire_bytes);
-  return {};
+bool is_vlan_tag(std::uint16_t type) noexcept {
+  return type == 0x8100 || type == 0x88A8 || type == 0x9100;
+}
+
+/// Reads what lies behind the type of the link layer. `rest` begins behind that type.
+CapturedDatagram by_ether_type(std::uint16_t type, Bytes rest, std::uint64_t wire_bytes) noexcept {
+  constexpr std::size_t kTagBytes = 4;
+  while (is_vlan_tag(type)) {
+    if (rest.size() < kTagBytes || wire_bytes < kTagBytes) return {};
+    type = u16(rest, 2);
+    rest = rest.subspan(kTagBytes);
+    wire_bytes -= kTagBytes;
+  }
+  if (type == kEtherIpv4) return ipv4(rest, wire_bytes);
+  if (type == kEtherIpv6) return ipv6(rest, wire_bytes);
+  // Smaller numbers are lengths of frames that bridges send to each other.
+  constexpr std::uint16_t kFirstType = 0x0600;
+  if (type == kEtherArp || type < kFirstType) return {};
+  CapturedDatagram out;
+  out.kind = Kind::unknown_network;
+  out.ether_type = type;
+  return out;
 }
 
 CapturedDatagram ethernet(Bytes frame, std::uint64_t wire_bytes) noexcept {
-  std::size_t at = 12;
-  // Skip up to two VLAN tags.
-  for (int tags = 0; tags < 2 && frame.size() >= at + 2; ++tags) {
-    const std::uint16_t type = u16(frame, at);
-    if (type != 0x8100 && type != 0x88A8 && type != 0x9100) break;
-    at += 4;
-  }
-  if (frame.size() < at + 2 || wire_bytes < at + 2) return {};
-  return by_ether_type(u16(frame, at), frame.subspan(at + 2), wire_bytes - at - 2);
+  constexpr std::size_t kTypeAt = 12;
+  if (frame.size() < kTypeAt + 2 || wire_bytes < kTypeAt + 2) return {};
+  return by_ether_type(u16(frame, kTypeAt), frame.subspan(kTypeAt + 2), wire_bytes - kTypeAt - 2);
 }
 
 CapturedDatagram loopback(const CapturedPacket& packet) noexcept {
@@ -157,7 +177,7 @@ CapturedDatagram find_datagram(const CapturedPacket& packet) noexcept {
     case kIpv6:
       return by_version(data, wire_bytes);
     default:
-      return {Kind::unknown_link_layer, 0, {}};
+      return {Kind::unknown_link_layer, 0, {}, 0};
   }
 }
 

@@ -2,12 +2,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
 #include <map>
 #include <vector>
 
 #include "emit/protocol/convert.hpp"
 #include "emit/protocol/record/log_edit.hpp"
+#include "emit/protocol/record/log_range.hpp"
 #include "record/log_copy.hpp"
 #include "record/log_message.hpp"
 
@@ -19,93 +19,18 @@ using physics::ErrorCode;
 using physics::make_error;
 using physics::Result;
 
-/// Divides, so that whole decimals stay short.
-double seconds(std::int64_t ns) noexcept {
-  constexpr double kNsPerS = 1e9;
-  return static_cast<double>(ns) / kNsPerS;
-}
-
-/// Range of simulation time, both ends included, ns.
-struct CutRange {
-  std::int64_t from_ns = std::numeric_limits<std::int64_t>::min();
-  std::int64_t to_ns = std::numeric_limits<std::int64_t>::max();
-
-  [[nodiscard]] bool meets(const std::optional<LogSpan>& span) const noexcept {
-    return span && span->last_ns >= from_ns && span->first_ns <= to_ns;
-  }
-  [[nodiscard]] std::string text() const {
-    const bool begins = from_ns != std::numeric_limits<std::int64_t>::min();
-    const bool ends = to_ns != std::numeric_limits<std::int64_t>::max();
-    if (begins && ends) return fmt::format("from {} s to {} s", seconds(from_ns), seconds(to_ns));
-    if (begins) return fmt::format("from {} s on", seconds(from_ns));
-    return ends ? fmt::format("up to {} s", seconds(to_ns)) : "at any time";
-  }
-};
-
-/// One run as the choice sees it.
-struct Candidate {
-  std::uint64_t run_id = 0;
-  std::optional<LogSpan> sim_time;
-  bool known = true;  ///< the run id is known
-};
-
-std::string list_of(const std::vector<Candidate>& runs, const std::vector<std::size_t>& chosen) {
-  constexpr std::size_t kMaxListed = 8;
-  std::string text;
-  for (std::size_t i = 0; i < chosen.size() && i < kMaxListed; ++i) {
-    const Candidate& run = runs[chosen[i]];
-    text += fmt::format("{}{}", i == 0 ? "" : ", ", run.run_id);
-    if (run.sim_time) {
-      text += fmt::format(" ({} s to {} s)", seconds(run.sim_time->first_ns),
-                          seconds(run.sim_time->last_ns));
-    }
-  }
-  if (chosen.size() > kMaxListed) text += fmt::format(" and {} more", chosen.size() - kMaxListed);
-  return text;
-}
-
-/// Returns the place of the run that is cut.
-Result<std::size_t> choose_run(const fs::path& file, const std::vector<Candidate>& runs,
-                               const CutRange& range, std::optional<std::uint64_t> run_id) {
-  std::vector<std::size_t> chosen;
-  std::vector<std::size_t> with_frames;
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    if (!runs[i].sim_time) continue;
-    with_frames.push_back(i);
-    if (run_id && (!runs[i].known || runs[i].run_id != *run_id)) continue;
-    if (range.meets(runs[i].sim_time)) chosen.push_back(i);
-  }
-  if (chosen.size() == 1) return chosen.front();
-  if (chosen.empty()) {
-    return make_error(
-        ErrorCode::invalid_argument,
-        fmt::format("{}: no frame {}{}; runs: {}", file.string(), range.text(),
-                    run_id ? fmt::format(" in run {}", *run_id) : "",
-                    with_frames.empty() ? "none has a frame" : list_of(runs, with_frames)));
-  }
-  return make_error(ErrorCode::invalid_argument,
-                    fmt::format("{}: {} runs have frames {}, choose one by its id: {}",
-                                file.string(), chosen.size(), range.text(), list_of(runs, chosen)));
-}
-
 /// Cuts a journal.
 class JournalCut {
  public:
-  JournalCut(const LogCutOptions& options, const CutRange& range, const LogOutline& outline)
+  JournalCut(const LogCutOptions& options, const LogRange& range, const LogOutline& outline)
       : options_(options), range_(range), outline_(outline) {}
 
   /// Chooses what is kept.
   Result<void> plan(const fs::path& file, LogCutSummary& summary) {
-    std::vector<Candidate> candidates;
-    for (const LogRunOutline& run : outline_.runs) {
-      candidates.push_back({run.run_id, run.sim_time, run.has_start});
-    }
-    const auto chosen = choose_run(file, candidates, range_, options_.run_id);
-    if (!chosen) return tl::unexpected(chosen.error());
-    wanted_ = *chosen;
-    std::size_t begin = wanted_;
-    while (begin > 0 && !outline_.runs[begin].begins_process) --begin;
-    first_ = options_.only_run ? wanted_ : begin;
+    const auto needed = plan_journal(file, outline_, range_, options_.run_id);
+    if (!needed) return tl::unexpected(needed.error());
+    wanted_ = needed->wanted;
+    first_ = options_.only_run ? wanted_ : needed->first;
     const LogRunOutline& first = outline_.runs[first_];
     if (!first.has_start) {
       return make_error(
@@ -117,7 +42,7 @@ class JournalCut {
     summary.journal = true;
     summary.run_id = outline_.runs[wanted_].run_id;
     summary.earlier_runs = wanted_ - first_;
-    summary.left_out_runs = first_ - begin;
+    summary.left_out_runs = first_ - needed->first;
     return {};
   }
 
@@ -155,7 +80,7 @@ class JournalCut {
 
  private:
   const LogCutOptions& options_;
-  const CutRange& range_;
+  const LogRange& range_;
   const LogOutline& outline_;
   std::size_t first_ = 0;   // place of the first run that is kept
   std::size_t wanted_ = 0;  // place of the run that is cut
@@ -168,11 +93,11 @@ class JournalCut {
 /// Cuts a pose log.
 class PoseCut {
  public:
-  PoseCut(const LogCutOptions& options, const CutRange& range, const LogOutline& outline)
+  PoseCut(const LogCutOptions& options, const LogRange& range, const LogOutline& outline)
       : options_(options), range_(range), outline_(outline) {}
 
   Result<void> plan(const fs::path& file, LogCutSummary& summary) {
-    std::vector<Candidate> candidates;
+    std::vector<LogRunChoice> candidates;
     for (const LogHostRunOutline& run : outline_.host_runs) {
       candidates.push_back({run.run_id, run.sim_time});
     }
@@ -266,7 +191,7 @@ class PoseCut {
   }
 
   const LogCutOptions& options_;
-  const CutRange& range_;
+  const LogRange& range_;
   const LogOutline& outline_;
   std::size_t wanted_ = 0;  // place of the run that is cut
   std::size_t runs_begun_ = 0;
@@ -280,13 +205,8 @@ class PoseCut {
 
 Result<LogCutSummary> cut_log(const fs::path& in, const fs::path& out,
                               const LogCutOptions& options) {
-  CutRange range;
-  if (options.from_ns) range.from_ns = *options.from_ns;
-  if (options.to_ns) range.to_ns = *options.to_ns;
-  if (range.from_ns > range.to_ns) {
-    return make_error(ErrorCode::invalid_argument,
-                      fmt::format("the range {} is empty", range.text()));
-  }
+  const auto range = LogRange::make(options.from_ns, options.to_ns);
+  if (!range) return tl::unexpected(range.error());
   // Refuse a bad output before the input is read.
   if (auto place = PartFile::begin(out, std::span(&in, 1)); !place) {
     return tl::unexpected(place.error());
@@ -296,8 +216,8 @@ Result<LogCutSummary> cut_log(const fs::path& in, const fs::path& out,
   if (outline->damage) return tl::unexpected(*outline->damage);
   LogCutSummary summary;
   summary.truncation = outline->truncation;
-  JournalCut journal(options, range, *outline);
-  PoseCut poses(options, range, *outline);
+  JournalCut journal(options, *range, *outline);
+  PoseCut poses(options, *range, *outline);
   const bool is_journal = outline->journal_entries > 0;
   if (!is_journal && outline->host_runs.empty()) {
     return make_error(ErrorCode::unsupported,
@@ -341,7 +261,7 @@ Result<LogCutSummary> cut_log(const fs::path& in, const fs::path& out,
   if (summary.frames == 0) {
     return make_error(
         ErrorCode::invalid_argument,
-        fmt::format("{}: run {} has no frame {}", in.string(), summary.run_id, range.text()));
+        fmt::format("{}: run {} has no frame {}", in.string(), summary.run_id, range->text()));
   }
   if (auto done = copier->finish(); !done) return tl::unexpected(done.error());
   summary.messages = copier->messages();

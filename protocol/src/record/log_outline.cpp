@@ -123,6 +123,17 @@ class OutlineMaker {
     run.device = start.device();
     run.pacing = start.pacing();
     run.first_time_ns = start.first_time_ns();
+    if (start.has_recording()) run.recording = shared(start.recording());
+  }
+
+  /// Returns the setup that an earlier run has, where it is the same.
+  std::shared_ptr<const v1::Recording> shared(const v1::Recording& recording) {
+    std::string bytes = recording.SerializeAsString();
+    if (recording_ == nullptr || bytes != recording_bytes_) {
+      recording_ = std::make_shared<const v1::Recording>(recording);
+      recording_bytes_ = std::move(bytes);
+    }
+    return recording_;
   }
 
   void add_frame(LogRunOutline& run, const v1::FrameDecision& frame) {
@@ -141,6 +152,8 @@ class OutlineMaker {
   LogMessageDecoder decoder_;
   std::map<std::uint16_t, std::size_t> topics_;  ///< place in LogOutline::topics by channel
   std::uint64_t last_sequence_ = 0;
+  std::shared_ptr<const v1::Recording> recording_;  // of the newest run that has one
+  std::string recording_bytes_;
 };
 
 }  // namespace

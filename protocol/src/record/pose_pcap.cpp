@@ -31,6 +31,9 @@ struct PosePcapReader::Impl {
   std::uint64_t repeated = 0;
   std::uint64_t refused = 0;
   std::string first_refusal;
+  std::uint64_t later_fragments = 0;
+  std::uint64_t unread = 0;  // packets of network layers that are not handled
+  std::string first_unread;
   std::optional<Error> failure;
 
   tl::unexpected<Error> fail(ErrorCode code, std::string_view text) {
@@ -90,7 +93,14 @@ Result<bool> PosePcapReader::next() {
                                      "loopback and raw IP are",
                                      packet.link_type));
     }
-    if (found.kind == Kind::none || found.destination_port != impl_->port) continue;
+    if (found.kind == Kind::later_fragment) ++impl_->later_fragments;
+    if (found.kind == Kind::unknown_network && ++impl_->unread == 1) {
+      impl_->first_unread =
+          fmt::format("packet {}: Ethernet type 0x{:04x}", packet.number, found.ether_type);
+    }
+    if (found.kind == Kind::none || found.kind == Kind::later_fragment ||
+        found.kind == Kind::unknown_network || found.destination_port != impl_->port)
+      continue;
     if (found.kind == Kind::fragment) {
       return impl_->fail(ErrorCode::unsupported,
                          fmt::format("a datagram to port {} in IP fragments, which are not put "
@@ -126,6 +136,16 @@ std::optional<std::string> PosePcapReader::notes() const {
   if (impl_->frames == 0 && impl_->refused == 0) {
     add(fmt::format("{}: none of {} packets is a datagram to port {}", impl_->path.string(),
                     impl_->capture.packet().number, impl_->port));
+  }
+  if (impl_->later_fragments > 0) {
+    add(
+        fmt::format("{}: {} later IP fragments of UDP datagrams, whose port is not known, are left "
+                    "out",
+                    impl_->path.string(), impl_->later_fragments));
+  }
+  if (impl_->unread > 0) {
+    add(fmt::format("{}: {} packets are neither IP nor ARP and are left out ({})",
+                    impl_->path.string(), impl_->unread, impl_->first_unread));
   }
   if (impl_->capture.truncation()) add(*impl_->capture.truncation());
   return out.empty() ? std::nullopt : std::optional(out);

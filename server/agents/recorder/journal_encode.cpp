@@ -111,7 +111,8 @@ bool to_journal_entry(std::span<const std::byte> line, const Recorder::Identity&
       message.set_device(identity.device);
       message.set_pacing(identity.pacing);
       message.set_first_time_ns(identity.first_time_ns);
-      return true;
+      return identity.recording.empty() ||
+             message.mutable_recording()->ParseFromString(identity.recording);
     }
     case JournalKind::host_frame:
       return host_frame(line, *out.mutable_host_frame());

@@ -32,6 +32,7 @@ class Recorder final : public Agent {
     std::string device;
     std::string pacing;
     std::int64_t first_time_ns = 0;
+    std::string recording;  ///< encoded v1::Recording; empty: none
   };
   Recorder(Context& context, config::JournalConfig config, std::size_t max_peers);
 

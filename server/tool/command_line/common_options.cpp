@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tool/command_line/common_options.hpp"
 
+#include <fmt/format.h>
+
 #include <charconv>
 #include <cmath>
 
 #include "emit/config/load.hpp"
+#include "emit/physics/limits.hpp"
 
 namespace emit::tool {
 
@@ -34,6 +37,18 @@ std::optional<double> parse_speed(const std::string& text) {
   if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
   if (!std::isfinite(value) || value <= 0.0) return std::nullopt;
   return value;
+}
+
+physics::Result<std::optional<std::int64_t>> sim_time_ns(std::string_view option,
+                                                         std::optional<double> time_s) {
+  if (!time_s) return std::nullopt;
+  constexpr double kMaxTimeS = physics::limits::kMaxSimTimeS;
+  if (!(std::abs(*time_s) <= kMaxTimeS)) {
+    return physics::make_error(physics::ErrorCode::invalid_argument,
+                               fmt::format("{}: {} s is out of range, must be {} .. {}", option,
+                                           *time_s, -kMaxTimeS, kMaxTimeS));
+  }
+  return std::llround(*time_s * 1e9);
 }
 
 void add_gpu(CommandLine& line, int& target) {

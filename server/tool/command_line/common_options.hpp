@@ -20,6 +20,11 @@ void add_set(CommandLine& line, std::vector<std::string>& target);
 void add_scenario(CommandLine& line, ScenarioChoice& target, const std::string& name);
 /// Reads a multiple of a pace: a positive number, or "max", for which 0 stands. Empty: neither.
 [[nodiscard]] std::optional<double> parse_speed(const std::string& text);
+
+/// Converts an option's simulation time from seconds to nanoseconds; absent stays absent. Errors
+/// (invalid_argument): it is out of range; the message names the option.
+[[nodiscard]] physics::Result<std::optional<std::int64_t>> sim_time_ns(
+    std::string_view option, std::optional<double> time_s);
 /// --gpu N.
 void add_gpu(CommandLine& line, int& target);
 /// --png-of QUANTITY: what the colours of a PNG stand for. `surface`: the frames carry temperatures

@@ -405,13 +405,15 @@ Result<void> Demo::replay() {
     const auto bytes = std::as_bytes(frame.view->radiance_w_m2_sr[plane]);
     if (protocol::crc32c(bytes) != received->second) ++results_.replay_client_mismatches;
   };
-  auto summary =
-      replay_journal(scenario_, options, [&](const server::ReplayedFrame& frame) -> Result<void> {
-        if (frame.view == nullptr) return {};
-        compare(frame, *tcp_client_, injection);
-        compare(frame, *udp_client_, projector);
-        return {};
-      });
+  ReplayHooks hooks;
+  hooks.on_frame = [&](const server::ReplayedFrame& frame, std::uint64_t) -> Result<void> {
+    if (frame.view == nullptr) return {};
+    compare(frame, *tcp_client_, injection);
+    compare(frame, *udp_client_, projector);
+    return {};
+  };
+  SystemReplayClock clock;
+  auto summary = replay_journal(renderer_bench(scenario_, options, clock), options, hooks);
   if (!summary) return tl::unexpected(summary.error());
   results_.replay = std::move(*summary);
   return {};

@@ -2,10 +2,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <numeric>
 
-#include "emit/physics/limits.hpp"
 #include "emit/protocol/record/log_csv.hpp"
 #include "emit/protocol/record/log_edit.hpp"
 #include "emit/protocol/record/pose_pcap.hpp"
@@ -78,18 +76,6 @@ physics::Result<void> require_mcap(const std::filesystem::path& file, std::strin
                   is_pose_csv(file) ? "CSV pose log" : "network capture", use));
 }
 
-physics::Result<std::optional<std::int64_t>> to_ns(std::string_view option,
-                                                   std::optional<double> time_s) {
-  if (!time_s) return std::nullopt;
-  constexpr double kMaxTimeS = physics::limits::kMaxSimTimeS;
-  if (!(std::abs(*time_s) <= kMaxTimeS)) {
-    return physics::make_error(physics::ErrorCode::invalid_argument,
-                               fmt::format("{}: {} s is out of range, must be {} .. {}", option,
-                                           *time_s, -kMaxTimeS, kMaxTimeS));
-  }
-  return std::llround(*time_s * 1e9);
-}
-
 std::string counted(std::uint64_t count, std::string_view what) {
   return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
 }
@@ -116,9 +102,9 @@ std::string text_of(const protocol::LogCutSummary& cut) {
 }
 
 int run_cut(const CutOptions& command) {
-  const auto from_ns = to_ns("--from-s", command.from_s);
+  const auto from_ns = sim_time_ns("--from-s", command.from_s);
   if (!from_ns) return fail_call(from_ns.error());
-  const auto until_ns = to_ns("--to-s", command.to_s);
+  const auto until_ns = sim_time_ns("--to-s", command.to_s);
   if (!until_ns) return fail_call(until_ns.error());
   auto mcap = require_mcap(command.log, "emit record and emit make-log write logs to cut");
   if (!mcap) return fail_call(mcap.error());

@@ -12,6 +12,7 @@
 #include "emit/protocol/record/mcap_summary.hpp"
 #include "tool/command_line/common_options.hpp"
 #include "tool/commands/log_commands.hpp"
+#include "tool/commands/log_setup.hpp"
 #include "tool/streams/pose_log.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
@@ -177,6 +178,7 @@ void print_run(std::FILE* out, const protocol::LogRunOutline& run) {
     fmt::print(out, "  scenario    {}, SHA-256 {}\n", run.scenario_name, run.scenario_sha256);
     fmt::print(out, "  made by     {} on {}, pacing {}, warmed up for {} s\n", run.software,
                run.device, run.pacing, sim_text(run.first_time_ns));
+    fmt::print(out, "  setup       {}\n", setup_text(run));
   } else {
     fmt::print(out, "\nrun without its start: it does not replay\n");
   }
@@ -248,6 +250,7 @@ Json json_of(const protocol::LogRunOutline& run) {
   json.set("first_frame", run.first_frame).set("last_frame", run.last_frame);
   set_span(json, "log_time", run.log_time);
   set_span(json, "sim_time", run.sim_time);
+  json.set("setup", setup_json(run));
   return json;
 }
 

@@ -3,12 +3,11 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
-#include <memory>
-#include <optional>
-#include <thread>
+#include <algorithm>
+#include <utility>
 
 #include "emit/protocol/record/log.hpp"
+#include "emit/protocol/record/log_range.hpp"
 #include "emit/protocol/record/pose_pcap.hpp"
 #include "emit/v1/control.pb.h"
 #include "tool/support/console.hpp"
@@ -18,50 +17,12 @@
 namespace emit::tool {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using physics::ErrorCode;
+using physics::make_error;
+using physics::Result;
 
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-void warn_of_differences(const server::JournalPlayer& player, const std::string& scenario_hash,
-                         const std::string& device) {
-  if (player.scenario_sha256() != scenario_hash) {
-    warn(
-        "the journal was recorded with another scenario, or its files have changed since: frames "
-        "may differ; give the --scenario and every --set value that the daemon had");
-  }
-  if (player.device() != device) {
-    warn(fmt::format("the journal was recorded on '{}', this is '{}': frames may differ",
-                     player.device(), device));
-  }
-}
-
-/// Facts about a journal that a replay needs before it plays it.
-struct JournalOutline {
-  std::uint64_t frames = 0;
-  std::int64_t first_time_ns = 0;  ///< simulation time that the daemon was warmed up for
-  std::uint64_t first_sequence = 0;
-};
-/// Returns the outline of a journal, up to what does not read. The replay itself reports errors of
-/// the log.
-JournalOutline outline_of(const std::filesystem::path& file) {
-  JournalOutline outline;
-  bool started = false;
-  auto log = protocol::LogReader::open(file);
-  while (log && !InterruptGuard::interrupted()) {
-    const auto more = log->next();
-    if (!more || !*more) break;
-    if (log->topic() != protocol::LogTopic::journal) continue;
-    const v1::JournalEntry& entry = log->journal();
-    if (entry.has_frame()) ++outline.frames;
-    if (outline.first_sequence == 0) outline.first_sequence = entry.sequence();
-    if (entry.has_run_start() && !started) {
-      started = true;
-      outline.first_time_ns = entry.run_start().first_time_ns();
-    }
-  }
-  return outline;
+double seconds(std::int64_t ns) noexcept {
+  return 1e-9 * static_cast<double>(ns);
 }
 
 /// A source in the state in which a daemon starts, and the player that feeds it.
@@ -70,23 +31,12 @@ struct ReplayedDaemon {
   std::optional<server::JournalPlayer> player;
 
   /// Warms a new source up, in place of the former one.
-  physics::Result<void> start(const scene::ScenarioDesc& scenario,
-                              const JournalReplayOptions& options, std::int64_t first_time_ns) {
+  Result<void> start(const ReplayBench& bench, std::int64_t first_time_ns) {
     player.reset();
     source.reset();
-    renderer::OutputOptions output;
-    output.temperature = output.depth = output.object = options.temperature;
-    output.slots = 3;
-    output.ladder = renderer::Ladder::replayed;
-    Progress warm_up("warm-up", 1000);
-    auto made = server::make_renderer_source(
-        scenario, renderer::DeviceOptions{options.gpu_index, false}, output, first_time_ns,
-        [&](double done_frac) {
-          warm_up.advance_to(static_cast<std::uint64_t>(1000.0 * done_frac));
-          return !InterruptGuard::interrupted();
-        });
+    auto made = bench.make_source(first_time_ns);
     if (!made) return tl::unexpected(made.error());
-    auto channels = server::make_channels(scenario, (*made)->info());
+    auto channels = server::make_channels(bench.scenario, (*made)->info());
     if (!channels) return tl::unexpected(channels.error());
     source = std::move(*made);
     player.emplace(*source, std::move(*channels));
@@ -94,101 +44,294 @@ struct ReplayedDaemon {
   }
 };
 
-}  // namespace
+class JournalReplay {
+ public:
+  JournalReplay(const ReplayBench& bench, const JournalReplayOptions& options,
+                const ReplayHooks& hooks)
+      : bench_(bench), options_(options), hooks_(hooks), pace_(*bench.clock, options.speed) {}
 
-physics::Result<JournalReplaySummary> replay_journal(
-    const scene::ScenarioDesc& scenario, const JournalReplayOptions& options,
-    const std::function<physics::Result<void>(const server::ReplayedFrame&)>& on_frame) {
-  if (protocol::PosePcapReader::is_capture(options.log)) {
-    return physics::make_error(
-        physics::ErrorCode::unsupported,
-        fmt::format(
-            "{}: a network capture holds the host's poses, not the daemon's decisions: play "
-            "it with emit send and record the journal",
-            options.log.string()));
-  }
-  auto log = protocol::LogReader::open(options.log);
-  if (!log) return tl::unexpected(log.error());
-  const auto scenario_hash = server::scenario_sha256(scenario);
-  if (!scenario_hash) return tl::unexpected(scenario_hash.error());
-
-  const JournalOutline outline = outline_of(options.log);
-  JournalReplaySummary summary;
-  auto start = Clock::now();
-  ReplayedDaemon daemon;
-  if (auto started = daemon.start(scenario, options, outline.first_time_ns); !started) {
-    return tl::unexpected(started.error());
-  }
-  const renderer::SceneStats& scene = daemon.source->info().scene;
-  for (const std::string& text : scene.warnings) warn(text);
-  for (const std::string& text : renderer::warm_up_warnings(scene)) warn(text);
-  if (outline.first_sequence > 1 && scenario.thermal.method == scene::ThermalMethod::cached) {
-    warn(
-        "the journal lacks earlier runs of its daemon, and a cached surface remembers them: frames "
-        "may differ");
-  }
-  summary.device = daemon.source->info().device;
-  summary.setup_s = seconds_since(start);
-
-  Progress progress("replay", outline.frames);
-  start = Clock::now();
-  std::int64_t first_wall_ns = 0;
-  bool compared_run = false;
-  std::uint64_t last_sequence = 0;
-  while (!InterruptGuard::interrupted()) {
-    const auto more = log->next();
-    if (!more) return tl::unexpected(more.error());
-    if (!*more) break;
-    if (log->topic() != protocol::LogTopic::journal) continue;
-    const v1::JournalEntry& entry = log->journal();
-    if (options.speed > 0.0 && entry.has_frame()) {
-      if (first_wall_ns == 0) first_wall_ns = entry.wall_time_ns();
-      const double offset_s =
-          1e-9 * static_cast<double>(entry.wall_time_ns() - first_wall_ns) / options.speed;
-      std::this_thread::sleep_until(start + std::chrono::duration_cast<Clock::duration>(
-                                                std::chrono::duration<double>(offset_s)));
+  Result<JournalReplaySummary> run() {
+    for (const auto step : {&JournalReplay::plan, &JournalReplay::identify}) {
+      if (auto done = (this->*step)(); !done) return tl::unexpected(done.error());
     }
-    // Another daemon begins where the numbers do, as in a merged log. Its surface was warmed up
-    // anew.
-    if (entry.has_run_start() && entry.sequence() <= last_sequence) {
-      auto restarted = daemon.start(scenario, options, entry.run_start().first_time_ns());
-      if (!restarted) return tl::unexpected(restarted.error());
-      compared_run = false;
+    begin_ns_ = bench_.clock->now_ns();
+    Progress progress("replay", options_.passes * planned_frames_);
+    progress_ = &progress;
+    while (!ended_ && (options_.passes == 0 || summary_.passes < options_.passes)) {
+      ++summary_.passes;
+      if (auto played = play(); !played) return tl::unexpected(played.error());
+      ended_ = ended_ || InterruptGuard::interrupted();
     }
-    last_sequence = entry.sequence();
-    server::JournalPlayer& player = *daemon.player;
-    const auto applied = player.apply(entry);
+    progress.finish();
+    if (truncation_) warn(*truncation_);
+    summary_.latest_ns = pace_.latest_ns();
+    summary_.play_s = seconds(bench_.clock->now_ns() - begin_ns_) - summary_.setup_s;
+    if (summary_.frames == 0 && !ended_) {
+      return make_error(ErrorCode::parse, fmt::format("{}: the log holds no journalled frame",
+                                                      options_.log.string()));
+    }
+    return std::move(summary_);
+  }
+
+ private:
+  /// Reads what the log holds and chooses its runs.
+  Result<void> plan() {
+    auto outline =
+        protocol::outline_log(options_.log, [](auto) { return !InterruptGuard::interrupted(); });
+    if (!outline) return tl::unexpected(outline.error());
+    outline_ = std::move(*outline);
+    if (outline_.frames == 0) {
+      if (outline_.damage) return tl::unexpected(*outline_.damage);
+      return make_error(ErrorCode::parse, fmt::format("{}: the log holds no journalled frame",
+                                                      options_.log.string()));
+    }
+    last_run_ = outline_.runs.size() - 1;
+    if (options_.is_part()) {
+      const auto range = protocol::LogRange::make(options_.from_ns, options_.to_ns);
+      if (!range) return tl::unexpected(range.error());
+      const auto part = protocol::plan_journal(options_.log, outline_, *range, options_.run_id);
+      if (!part) return tl::unexpected(part.error());
+      range_ = *range;
+      first_run_ = part->first;
+      last_run_ = part->wanted;
+    }
+    const protocol::LogRunOutline& first = outline_.runs[first_run_];
+    if (!first.has_start) {
+      return make_error(ErrorCode::unsupported,
+                        fmt::format("{}: the log begins in the middle of a run, at entry {}, and "
+                                    "does not replay; emit log cut --only-run takes a later run",
+                                    options_.log.string(), first.first_sequence));
+    }
+    for (std::size_t i = first_run_; i <= last_run_; ++i)
+      planned_frames_ += outline_.runs[i].frames;
+    const bool cached =
+        bench_.scenario && bench_.scenario->thermal.method == scene::ThermalMethod::cached;
+    if (first.first_sequence > 1 && cached) {
+      warn(
+          "the journal lacks earlier runs of its daemon, and a cached surface remembers them: "
+          "frames may differ");
+    }
+    return {};
+  }
+
+  /// Compares the setups of the runs with the own one. The device is known later.
+  Result<void> identify() {
+    std::optional<server::ScenarioIdentity> identity;
+    if (bench_.scenario) {
+      auto identified = server::identify_scenario(*bench_.scenario);
+      if (!identified) return tl::unexpected(identified.error());
+      identity = std::move(*identified);
+      own_.scenario_name = bench_.scenario->name;
+      own_.scenario_sha256 = identity->sha256;
+    }
+    own_.software = server::build_text("emit");
+    const auto channels = server::make_channels(bench_.scenario, bench_.expected);
+    if (!channels) return tl::unexpected(channels.error());
+    v1::Recording own;
+    server::fill(identity ? &*identity : nullptr, nullptr, channels->channels, own);
+    bool silent = false;
+    for (std::size_t i = first_run_; i <= last_run_; ++i) {
+      const protocol::LogRunOutline& run = outline_.runs[i];
+      const server::RunOrigin recorded{run.software, run.device, run.scenario_name,
+                                       run.scenario_sha256};
+      if (i == first_run_) summary_.recorded = recorded;
+      own_.device = recorded.device;
+      silent = silent || run.recording == nullptr;
+      note(server::compare_setup(recorded, run.recording.get(), own_, own));
+      if (run.recording != nullptr && run.recording->values_left_out() > 0) {
+        left_out_ = std::max(left_out_, run.recording->values_left_out());
+      }
+    }
+    for (const server::SetupDifference& difference : summary_.differences) {
+      warn(difference.text());
+    }
+    if (left_out_ > 0) {
+      warn(
+          fmt::format("the journal had no room for {} values, which are compared by the hash of "
+                      "the scenario alone",
+                      left_out_));
+    }
+    if (silent) {
+      warn(
+          fmt::format("the journal of {} does not say its configuration, files and channels: "
+                      "they are compared by the hash of the scenario alone",
+                      summary_.recorded.software));
+    }
+    const auto decisive =
+        std::ranges::count_if(summary_.differences, &server::SetupDifference::is_decisive);
+    if (decisive == 0) return {};
+    if (options_.anyway) return {};
+    return make_error(
+        ErrorCode::config,
+        fmt::format("{}: the recording had another scenario or other channels, so that its frames "
+                    "cannot come out: give the --scenario and every --set value that the daemon "
+                    "had, or --anyway to replay all the same",
+                    options_.log.string()));
+  }
+
+  /// Adds differences that are not known yet.
+  void note(std::vector<server::SetupDifference> differences) {
+    for (server::SetupDifference& one : differences) {
+      const std::string text = one.text();
+      const bool known = std::ranges::any_of(
+          summary_.differences, [&](const auto& other) { return other.text() == text; });
+      if (!known) summary_.differences.push_back(std::move(one));
+    }
+  }
+
+  Result<void> start_daemon(std::int64_t first_time_ns) {
+    const std::int64_t start_ns = bench_.clock->now_ns();
+    if (auto started = daemon_.start(bench_, first_time_ns); !started) return started;
+    summary_.setup_s += seconds(bench_.clock->now_ns() - start_ns);
+    pace_.restart();
+    const server::SourceInfo& info = daemon_.source->info();
+    if (!summary_.device.empty()) return {};
+    summary_.device = info.device;
+    for (const std::string& text : info.scene.warnings) warn(text);
+    for (const std::string& text : renderer::warm_up_warnings(info.scene)) warn(text);
+    for (std::size_t i = first_run_; i <= last_run_; ++i) {
+      const std::string& device = outline_.runs[i].device;
+      if (device == info.device) continue;
+      const std::size_t before = summary_.differences.size();
+      note({{server::SetupDifference::Kind::device, {}, device, info.device}});
+      if (summary_.differences.size() > before) warn(summary_.differences.back().text());
+    }
+    return {};
+  }
+
+  /// Plays the chosen runs once.
+  Result<void> play() {
+    auto log = protocol::LogReader::open(options_.log);
+    if (!log) return tl::unexpected(log.error());
+    std::size_t runs_begun = 0;
+    std::uint64_t last_sequence = 0;
+    bool showing = false;
+    daemon_.player.reset();
+    while (!ended_ && !InterruptGuard::interrupted()) {
+      const auto more = log->next();
+      if (!more) return tl::unexpected(more.error());
+      if (!*more) break;
+      if (log->topic() != protocol::LogTopic::journal) continue;
+      const v1::JournalEntry& entry = log->journal();
+      if (entry.has_run_start() || runs_begun == 0) ++runs_begun;
+      const std::size_t run = runs_begun - 1;
+      if (run < first_run_) continue;
+      if (run > last_run_) break;
+      // Another daemon begins where the numbers do, as in a merged log. Its surface was warmed up
+      // anew.
+      const bool begins = !daemon_.player || entry.sequence() <= last_sequence;
+      if (entry.has_run_start() && begins) {
+        auto started = start_daemon(entry.run_start().first_time_ns());
+        if (!started) return started;
+      }
+      last_sequence = entry.sequence();
+      const bool wanted = !options_.is_part() || run == last_run_;
+      bool shown = false;
+      if (entry.has_frame()) {
+        const std::int64_t at_ns = entry.frame().sim_time_ns();
+        if (wanted && at_ns > range_.to_ns) break;
+        shown = wanted && at_ns >= range_.from_ns;
+        if (shown && !showing) pace_.restart();
+        showing = showing || shown;
+        if (shown && !may_show(entry)) break;
+      }
+      if (auto applied = apply(entry, shown); !applied) return applied;
+    }
+    truncation_ = log->truncation();
+    return {};
+  }
+
+  /// Waits until the frame may come. Returns false when the replay ends before it.
+  bool may_show(const v1::JournalEntry& entry) {
+    if (hooks_.go_on && !hooks_.go_on()) {
+      ended_ = true;
+      return false;
+    }
+    pace_.wait_for(entry.wall_time_ns());
+    return !InterruptGuard::interrupted();
+  }
+
+  Result<void> apply(const v1::JournalEntry& entry, bool shown) {
+    const auto applied = daemon_.player->apply(entry);
     if (!applied) return tl::unexpected(applied.error());
-    if (entry.has_run_start() && !compared_run) {
-      compared_run = true;
-      summary.journal_device = player.device();
-      warn_of_differences(player, *scenario_hash, summary.device);
-    }
-    if (!*applied) continue;
+    if (!*applied) return {};
     const server::ReplayedFrame& frame = **applied;
     if (frame.view != nullptr && frame.view->device_failed) {
-      return physics::make_error(
-          physics::ErrorCode::gpu,
-          fmt::format("frame {}: the device reported an error", frame.frame_number));
+      return make_error(ErrorCode::gpu,
+                        fmt::format("frame {}: the device reported an error", frame.frame_number));
     }
-    ++summary.frames;
-    if (!frame.matches) ++summary.mismatches;
-    if (!frame.repeated) ++summary.rendered;
-    if (!frame.matches && summary.first_mismatch == 0) summary.first_mismatch = frame.frame_number;
-    if (on_frame) {
-      if (auto handled = on_frame(frame); !handled) return tl::unexpected(handled.error());
+    progress_->advance_to(++played_);
+    if (!shown) {
+      ++summary_.frames_before;
+      if (!frame.matches) ++summary_.mismatches_before;
+      return {};
     }
-    progress.advance_to(summary.frames);
+    ++summary_.frames;
+    if (!frame.repeated) ++summary_.rendered;
+    if (!frame.matches && summary_.mismatches++ == 0) {
+      summary_.first_mismatch = frame.frame_number;
+    }
+    return hooks_.on_frame ? hooks_.on_frame(frame, summary_.passes) : Result<void>();
   }
-  progress.finish();
-  if (log->truncation()) warn(*log->truncation());
-  summary.play_s = seconds_since(start);
-  if (summary.frames == 0) {
-    return physics::make_error(
-        physics::ErrorCode::parse,
-        fmt::format("{}: the log holds no journalled frame", options.log.string()));
+
+  const ReplayBench& bench_;
+  const JournalReplayOptions& options_;
+  const ReplayHooks& hooks_;
+  ReplayPace pace_;
+  protocol::LogOutline outline_;
+  protocol::LogRange range_;
+  std::size_t first_run_ = 0;
+  std::size_t last_run_ = 0;
+  std::uint64_t planned_frames_ = 0;  // of one pass
+  std::uint64_t played_ = 0;
+  server::RunOrigin own_;
+  std::uint32_t left_out_ = 0;
+  ReplayedDaemon daemon_;
+  JournalReplaySummary summary_;
+  std::optional<std::string> truncation_;
+  Progress* progress_ = nullptr;
+  std::int64_t begin_ns_ = 0;
+  bool ended_ = false;  // the caller wants no further frame
+};
+
+}  // namespace
+
+ReplayBench renderer_bench(const scene::ScenarioDesc& scenario, const JournalReplayOptions& options,
+                           ReplayClock& clock) {
+  ReplayBench bench;
+  bench.scenario = scenario;
+  bench.expected.width_px = scenario.sensor.width_px;
+  bench.expected.height_px = scenario.sensor.height_px;
+  bench.expected.planes = scenario.bands.size();
+  bench.clock = &clock;
+  bench.make_source = [&scenario, gpu_index = options.gpu_index,
+                       temperature = options.temperature](std::int64_t first_time_ns) {
+    renderer::OutputOptions output;
+    output.temperature = output.depth = output.object = temperature;
+    output.slots = 3;
+    output.ladder = renderer::Ladder::replayed;
+    Progress warm_up("warm-up", 1000);
+    return server::make_renderer_source(
+        scenario, renderer::DeviceOptions{gpu_index, false}, output, first_time_ns,
+        [&](double done_frac) {
+          warm_up.advance_to(static_cast<std::uint64_t>(1000.0 * done_frac));
+          return !InterruptGuard::interrupted();
+        });
+  };
+  return bench;
+}
+
+Result<JournalReplaySummary> replay_journal(const ReplayBench& bench,
+                                            const JournalReplayOptions& options,
+                                            const ReplayHooks& hooks) {
+  if (protocol::PosePcapReader::is_capture(options.log)) {
+    return make_error(
+        ErrorCode::unsupported,
+        fmt::format("{}: a network capture holds the host's poses, not the daemon's decisions: "
+                    "play it with emit send and record the journal",
+                    options.log.string()));
   }
-  return summary;
+  return JournalReplay(bench, options, hooks).run();
 }
 
 }  // namespace emit::tool

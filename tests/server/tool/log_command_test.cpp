@@ -49,7 +49,7 @@ TEST_F(CliLog, info_describes_a_journal) {
         "run 9, from 2027-01-15T08:00:00.000000 TAI, the first of a daemon", "SHA-256 0123abcd",
         "emitd test on llvmpipe, pacing host-step, warmed up for 1.500000 s",
         "4 (3 rendered), numbers 1 to 4, 0.010000 s to 0.040000 s", "flags: late 1, non_finite 1\n",
-        "sequence    no gap"}) {
+        "sequence    no gap", "setup       not recorded: the daemon was an older one"}) {
     EXPECT_THAT(text.out, HasSubstr(expected));
   }
   const ProcessResult json = log({"info", log_, "--json", "-"});
@@ -63,6 +63,7 @@ TEST_F(CliLog, info_describes_a_journal) {
   EXPECT_EQ(json_value(json.out, "non_finite"), "1");
   EXPECT_EQ(json_value(json.out, "gap_count"), "0");
   EXPECT_EQ(json_value(json.out, "error"), "null");
+  EXPECT_EQ(json_value(json.out, "setup"), "null");
 }
 
 TEST_F(CliLog, info_tells_a_crash_from_damage) {

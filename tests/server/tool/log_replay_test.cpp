@@ -1,83 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
 // Journals of a rendered scene replay bit for bit after they were cut and merged.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <chrono>
 #include <filesystem>
-#include <map>
+#include <fstream>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include "emit/protocol/record/log.hpp"
-#include "emit/v1/control.pb.h"
 #include "support/daemon_process.hpp"
 #include "support/emit_process.hpp"
+#include "support/small_world.hpp"
 
 namespace emit::test {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr std::chrono::seconds kReplayLimit{280};
-
-/// A block that casts a shadow on a road, and a box that drives by.
-std::string world(const std::string& method) {
-  return R"(epoch_utc = 2020-06-21T10:00:00Z
-[place]
-lat_deg = 48.0
-lon_deg = 11.0
-[[object]]
-gltf = "share:scenes/block-on-road.glb"
-[[object]]
-entity_id = 1
-gltf = "share:scenes/box.glb"
-trajectory = [
-  { time_s = -3600, position_m = [5, 5, 0], heading_deg = 90 },
-  { time_s = 0, position_m = [5, 5, 0], heading_deg = 90 },
-  { time_s = 5, position_m = [4, 2, 0], heading_deg = 180 },
-  { time_s = 40, position_m = [-6, 2, 0], heading_deg = 270 },
-]
-[sensor]
-width_px = 48
-height_px = 36
-trajectory = [
-  { time_s = 0, position_m = [-16, -15, 15], look_at_m = [0, 0, 0] },
-  { time_s = 40, position_m = [-10, -15, 15], look_at_m = [0, 0, 0] },
-]
-[thermal]
-max_samples = 4000
-method = ")" +
-         method + "\"\n";
-}
-
-/// Key of a frame in a journal: its run and its number.
-using FrameKey = std::pair<std::uint64_t, std::uint64_t>;
-
-/// CRCs of a journal's frames, and its runs in their order.
-struct Journal {
-  std::map<FrameKey, std::uint32_t> crcs;
-  std::vector<std::uint64_t> runs;
-
-  explicit Journal(const std::string& file) {
-    auto log = protocol::LogReader::open(file);
-    EXPECT_TRUE(log.has_value()) << log.error().text;
-    std::uint64_t run_id = 0;
-    for (auto more = log->next(); more && *more; more = log->next()) {
-      const v1::JournalEntry& entry = log->journal();
-      if (entry.has_run_start()) run_id = entry.run_start().run_id();
-      if (!entry.has_frame()) continue;
-      if (runs.empty() || runs.back() != run_id) runs.push_back(run_id);
-      crcs[{run_id, entry.frame().frame_number()}] = entry.frame().radiance_crc32c();
-    }
-  }
-};
 
 class LogReplay : public testing::TestWithParam<const char*> {
  protected:
   void SetUp() override {
-    folder_.write("world.toml", world(GetParam()));
+    folder_.write("world.toml", small_world(GetParam()));
     folder_.write("emitd.toml",
                   "scenario = \"world.toml\"\n[pacing]\nmode = \"host-step\"\n"
                   "[host]\nudp = \"127.0.0.1:0\"\n[control]\ntcp = \"127.0.0.1:0\"\n"
@@ -145,12 +93,77 @@ TEST_P(LogReplay, a_cut_and_a_merged_journal_give_the_same_pixels) {
     EXPECT_THAT(replay.err, HasSubstr("the journal lacks earlier runs of its daemon"));
   }
 
+  // Every way to play the second run, against the CRCs of the live run.
+  const std::vector<std::vector<std::string>> ways{
+      {"--run-id", run_id, "--from-s", "1", "--to-s", "2"},
+      {"--run-id", run_id, "--from-s", "1.5", "--to-s", "1.5"},
+      {"--run-id", run_id, "--to-s", "2", "--loop", "2"},
+      {"--run-id", run_id, "--from-s", "3", "--speed", "20"},
+  };
+  for (const std::vector<std::string>& way : ways) {
+    std::vector<std::string> command{"replay", first, "--scenario", folder_.file("world.toml")};
+    command.insert(command.end(), way.begin(), way.end());
+    EXPECT_THAT(expect_success(command).out, HasSubstr("bit-identical"));
+  }
+  const ProcessResult steps = run_process(
+      {"sh", "-c", "printf '\\n\\nq\\n' | \"$0\" replay \"$1\" --scenario \"$2\" --step",
+       EMIT_TEST_BIN_DIR "/emit", first, folder_.file("world.toml")},
+      kReplayLimit);
+  EXPECT_EQ(steps.exit_code, 0) << steps.err;
+  for (const std::uint64_t number : {1U, 2U}) {
+    EXPECT_THAT(steps.out, HasSubstr(fmt::format("frame {} of run {} at", number, whole.runs[0])));
+    EXPECT_THAT(steps.out,
+                HasSubstr(fmt::format("CRC {:08x}", whole.crcs.at({whole.runs[0], number}))));
+  }
+  EXPECT_THAT(steps.out, HasSubstr("2 frames replayed"));
+
   ASSERT_NO_FATAL_FAILURE(record({"fast.mcap"}));
   const std::string all = folder_.file("all.mcap");
   expect_success({"log", "merge", folder_.file("journal.mcap"), cut, "--out", all});
   const Journal merged(all);
   EXPECT_EQ(merged.runs.size(), 3U);
   expect_same_pixels(all, 13 + 5 + 9);
+}
+
+TEST_P(LogReplay, another_scenario_is_refused_by_its_keys_and_files) {
+  std::filesystem::copy_file(EMIT_TEST_BIN_DIR "/../share/emit/scenes/box.glb",
+                             folder_.file("box.glb"));
+  const auto write_world = [&](const std::string& more) {
+    std::string text = small_world(GetParam());
+    const std::string shipped = "share:scenes/box.glb";
+    text.replace(text.find(shipped), shipped.size(), "box.glb");
+    folder_.write("world.toml", text + more);
+  };
+  write_world("");
+  ASSERT_NO_FATAL_FAILURE(record({"fast.mcap"}));
+  const auto replay = [&](std::vector<std::string> more) {
+    std::vector<std::string> command{"replay", folder_.file("journal.mcap"), "--scenario",
+                                     folder_.file("world.toml")};
+    command.insert(command.end(), more.begin(), more.end());
+    return run_emit(command, kReplayLimit);
+  };
+  EXPECT_EQ(replay({}).exit_code, 0);
+  const ProcessResult info =
+      expect_success({"log", "info", folder_.file("journal.mcap"), "--json", "-"});
+  EXPECT_EQ(json_value(info.out, "thermal.max_samples"), "\"4000\"");
+  EXPECT_THAT(json_value(info.out, "pacing.mode"), HasSubstr("host-step"));
+  EXPECT_THAT(info.out, HasSubstr("\"name\": \"box.glb\""));
+
+  write_world("tolerance_k = 2.5\n");
+  const ProcessResult refused = replay({});
+  EXPECT_EQ(refused.exit_code, 78) << refused.err;
+  EXPECT_THAT(refused.err, HasSubstr("thermal.tolerance_k: recorded "));
+  EXPECT_THAT(refused.err, HasSubstr(", here 2.5"));
+  EXPECT_THAT(refused.err, HasSubstr("--anyway"));
+  EXPECT_THAT(refused.out, Not(HasSubstr("replayed")));
+
+  // The bytes behind the content of a .glb file are read by nobody, but they are another file.
+  write_world("");
+  std::ofstream(folder_.file("box.glb"), std::ios::app | std::ios::binary) << "\n";
+  const ProcessResult other_file = replay({});
+  EXPECT_EQ(other_file.exit_code, 78) << other_file.err;
+  EXPECT_THAT(other_file.err, HasSubstr("file box.glb: recorded "));
+  EXPECT_THAT(other_file.err, Not(HasSubstr("thermal.")));
 }
 
 INSTANTIATE_TEST_SUITE_P(Method, LogReplay, testing::Values("per-frame", "cached"),

@@ -50,6 +50,15 @@ struct LoadOptions {
 [[nodiscard]] std::string print_scenario(const scene::ScenarioDesc& scenario);
 [[nodiscard]] std::string print_daemon(const DaemonConfig& daemon);
 
+/// Key of an effective configuration, as `--set` takes it, and its value in the spelling of TOML.
+struct ConfigValue {
+  std::string key;
+  std::string value;
+};
+/// Lists the keys of a text of print_scenario() or print_daemon(), in its order. Elements of arrays
+/// of tables go by name where it is theirs alone (`object[truck].scale`), else by index.
+[[nodiscard]] std::vector<ConfigValue> list_values(std::string_view printed);
+
 /// Folders with shipped data in the order of search: EMIT_DATA_DIR, <executable>/../share/emit.
 [[nodiscard]] std::vector<std::filesystem::path> data_directories();
 /// First file `relative` (such as "scenarios/box.toml") in the data folders. Errors: not_found,

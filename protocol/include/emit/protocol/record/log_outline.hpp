@@ -5,12 +5,17 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "emit/physics/error.hpp"
 #include "emit/protocol/record/mcap_reader.hpp"
+
+namespace emit::v1 {
+class Recording;
+}
 
 namespace emit::protocol {
 
@@ -49,6 +54,8 @@ struct LogRunOutline {
   std::string device;
   std::string pacing;
   std::int64_t first_time_ns = 0;  ///< simulation time that the surface was warmed up for
+  /// Setup of the daemon; runs with the same one share it. Null: the journal does not say it.
+  std::shared_ptr<const v1::Recording> recording;
   std::uint64_t first_sequence = 0;
   std::uint64_t last_sequence = 0;
   std::uint64_t host_frames = 0;

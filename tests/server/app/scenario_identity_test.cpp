@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "app/replay.hpp"
+#include "app/scenario_identity.hpp"
 #include "support/daemon_process.hpp"
 
 namespace emit::server {
@@ -31,28 +31,28 @@ struct Files {
     std::ofstream(gltf_folder / name, std::ios::binary) << text;
   }
   [[nodiscard]] std::string hash() const {
-    const auto result = scenario_sha256(scenario);
+    const auto result = identify_scenario(scenario);
     EXPECT_TRUE(result.has_value()) << result.error().text;
-    return result.value_or(std::string());
+    return result ? result->sha256 : std::string();
   }
   test::ScratchFolder folder;
   fs::path gltf_folder;
   scene::ScenarioDesc scenario;
 };
 
-TEST(ScenarioHash, IsTheSameWhereverTheFolderLies) {
+TEST(ScenarioIdentity, IsTheSameWhereverTheFolderLies) {
   EXPECT_EQ(Files().hash(), Files().hash());
   EXPECT_EQ(Files().hash().size(), 64U);
 }
 
-TEST(ScenarioHash, DoesNotHangOnWhereTheWarmedUpStateIsKept) {
+TEST(ScenarioIdentity, DoesNotHangOnWhereTheWarmedUpStateIsKept) {
   Files files;
   const std::string before = files.hash();
   files.scenario.thermal.state_file = "/var/cache/emit/x.emitstate";
   EXPECT_EQ(files.hash(), before);
 }
 
-TEST(ScenarioHash, FollowsBuffersBesideAGltfFile) {
+TEST(ScenarioIdentity, FollowsBuffersBesideAGltfFile) {
   const Files files;
   const std::string before = files.hash();
   files.write("my buffer.bin", "abce");
@@ -60,12 +60,12 @@ TEST(ScenarioHash, FollowsBuffersBesideAGltfFile) {
   files.write("my buffer.bin", "abcd");
   EXPECT_EQ(files.hash(), before);
   fs::remove(files.gltf_folder / "my buffer.bin");
-  const auto missing = scenario_sha256(files.scenario);
+  const auto missing = identify_scenario(files.scenario);
   ASSERT_FALSE(missing.has_value());
   EXPECT_NE(missing.error().text.find("my buffer.bin"), std::string::npos) << missing.error().text;
 }
 
-TEST(ScenarioHash, FollowsBuffersOfABinaryGltfFile) {
+TEST(ScenarioIdentity, FollowsBuffersOfABinaryGltfFile) {
   Files files;
   std::string json = kGltf;
   json.resize((json.size() + 3) / 4 * 4, ' ');
@@ -84,14 +84,14 @@ TEST(ScenarioHash, FollowsBuffersOfABinaryGltfFile) {
   EXPECT_NE(files.hash(), before);
 }
 
-TEST(ScenarioHash, TellsFoldersWithinTheScenarioApart) {
+TEST(ScenarioIdentity, TellsFoldersWithinTheScenarioApart) {
   EXPECT_NE(Files("models").hash(), Files("other").hash());
 }
 
-TEST(ScenarioHash, NamesAGltfFileThatCannotBeParsed) {
+TEST(ScenarioIdentity, NamesAGltfFileThatCannotBeParsed) {
   const Files files;
   files.write("block.gltf", "{\"buffers\": [");
-  const auto result = scenario_sha256(files.scenario);
+  const auto result = identify_scenario(files.scenario);
   ASSERT_FALSE(result.has_value());
   EXPECT_EQ(result.error().code, physics::ErrorCode::parse);
   EXPECT_NE(result.error().text.find("block.gltf"), std::string::npos);

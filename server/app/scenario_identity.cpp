@@ -11,7 +11,7 @@
 #include <iterator>
 #include <vector>
 
-#include "app/replay.hpp"
+#include "app/scenario_identity.hpp"
 #include "app/sha256.hpp"
 #include "emit/config/load.hpp"
 
@@ -33,27 +33,32 @@ std::string label_of(const fs::path& file, const fs::path& folder) {
   return (beneath ? relative : file.filename()).generic_string();
 }
 
-/// Adds label, content and length of a file to the hash. Bytes that move from one file to the next,
-/// and new names, change it.
-Result<void> hash_file(const fs::path& file, const std::string& label, Sha256& hash) {
+/// Adds label, content and length of a file to the hash, and the file to the list. Bytes that move
+/// from one file to the next, and new names, change the hash.
+Result<void> hash_file(const fs::path& file, const std::string& label, Sha256& hash,
+                       std::vector<SceneFile>& files) {
   std::error_code code;
   std::ifstream in(file, std::ios::binary);
   if (!in || fs::is_directory(file, code)) {
     return make_error(ErrorCode::io, file.string() + ": cannot be read");
   }
   hash.update(std::as_bytes(std::span(label.c_str(), label.size() + 1)));
+  Sha256 of_file;
   std::vector<char> buffer(1u << 20);
   std::uint64_t bytes = 0;
   while (in) {
     in.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
     const auto count = static_cast<std::size_t>(in.gcount());
-    hash.update(std::as_bytes(std::span(buffer.data(), count)));
+    const auto part = std::as_bytes(std::span(buffer.data(), count));
+    hash.update(part);
+    of_file.update(part);
     bytes += count;
   }
   if (in.bad()) {
     return make_error(ErrorCode::io, file.string() + ": reading failed");
   }
   hash.update(std::as_bytes(std::span(&bytes, 1)));
+  files.push_back({label, of_file.finish(), bytes});
   return {};
 }
 
@@ -119,7 +124,8 @@ Result<std::vector<fs::path>> buffer_files(const fs::path& gltf) {
 
 }  // namespace
 
-Result<std::string> scenario_sha256(const scene::ScenarioDesc& scenario) {
+Result<ScenarioIdentity> identify_scenario(const scene::ScenarioDesc& scenario) {
+  ScenarioIdentity identity;
   Sha256 hash;
   std::error_code code;
   const fs::path folder = fs::absolute(scenario.file, code).lexically_normal().parent_path();
@@ -130,10 +136,11 @@ Result<std::string> scenario_sha256(const scene::ScenarioDesc& scenario) {
   for (auto& object : plain.objects) {
     object.gltf = label_of(object.gltf, folder);
   }
-  const std::string text = config::print_scenario(plain);
-  hash.update(std::as_bytes(std::span(text)));
+  identity.printed = config::print_scenario(plain);
+  hash.update(std::as_bytes(std::span(identity.printed)));
   for (const auto& object : scenario.objects) {
-    if (auto done = hash_file(object.gltf, label_of(object.gltf, folder), hash); !done) {
+    if (auto done = hash_file(object.gltf, label_of(object.gltf, folder), hash, identity.files);
+        !done) {
       return tl::unexpected<physics::Error>(std::move(done.error()));
     }
     auto buffers = buffer_files(object.gltf);
@@ -141,13 +148,14 @@ Result<std::string> scenario_sha256(const scene::ScenarioDesc& scenario) {
       return tl::unexpected<physics::Error>(std::move(buffers.error()));
     }
     for (const fs::path& buffer : *buffers) {
-      if (auto done = hash_file(buffer, label_of(buffer, folder), hash); !done) {
+      if (auto done = hash_file(buffer, label_of(buffer, folder), hash, identity.files); !done) {
         return tl::unexpected<physics::Error>(
             std::move(done.error()).with_context(object.gltf.string()));
       }
     }
   }
-  return hash.finish();
+  identity.sha256 = hash.finish();
+  return identity;
 }
 
 }  // namespace emit::server
