@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 # Installs the Debian 12 packages that emitd needs to build, run and pass its tests.
 # Uses sudo when not root. Prints what it installs; installs nothing that is already there.
-# Usage: install_deps.sh [--with-checkers] [--with-yardsticks]: what checks the source tree and reads its messages in
-# tests; what `emit bench stream` is put beside.
+# Usage: install_deps.sh [--with-checkers] [--with-yardsticks] [--with-peers]: what checks the source tree and reads its
+# messages in tests; what `emit bench stream` is put beside; other programs that tests put emitd's files and messages
+# before. Packages for Node.js among them go to $EMIT_PEERS_DIR, or to the folder emit/peers of the user's cache. Tests
+# look there, and are skipped where a peer is missing.
 set -euo pipefail
 
 build_tools=(g++ cmake ninja-build pkg-config git ca-certificates)
@@ -15,14 +17,25 @@ libraries=(libepoxy-dev libegl-dev libglfw3-dev libglm-dev libtinygltf-dev libst
 runtime=(libegl-mesa0 libgl1-mesa-dri xvfb xauth)
 checkers=(clang-format clang-tidy clang libclang-rt-dev python3 tshark)
 yardsticks=(iperf3 libzmq3-dev iceoryx libiceoryx-posh-dev)
+peers=(gpsd-tools proj-bin)
+node_peers=(@mcap/core@2 @mcap/support@1 protobufjs@7 open-dis@1 gps@0.9)
+peers_folder=${EMIT_PEERS_DIR:-${XDG_CACHE_HOME:-$HOME/.cache}/emit/peers}
 
+with_peers=false
 packages=("${build_tools[@]}" "${libraries[@]}" "${runtime[@]}")
 for option in "$@"; do
   case $option in
     --with-checkers) packages+=("${checkers[@]}") ;;
     --with-yardsticks) packages+=("${yardsticks[@]}") ;;
+    --with-peers)
+      with_peers=true
+      packages+=("${peers[@]}")
+      # Node.js may come from elsewhere.
+      command -v node >/dev/null || packages+=(nodejs)
+      command -v npm >/dev/null || packages+=(npm)
+      ;;
     *)
-      echo "usage: install_deps.sh [--with-checkers] [--with-yardsticks]" >&2
+      echo "usage: install_deps.sh [--with-checkers] [--with-yardsticks] [--with-peers]" >&2
       exit 2
       ;;
   esac
@@ -36,14 +49,27 @@ for package in "${packages[@]}"; do
 done
 if [[ ${#missing[@]} -eq 0 ]]; then
   echo "install_deps: all ${#packages[@]} packages are present"
-  exit 0
+else
+  as_root=()
+  if [[ $(id -u) -ne 0 ]]; then
+    command -v sudo >/dev/null || { echo "install_deps: run as root or install sudo" >&2; exit 1; }
+    as_root=(sudo)
+  fi
+  echo "install_deps: installing ${missing[*]}"
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get update -q
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends "${missing[@]}"
 fi
 
-as_root=()
-if [[ $(id -u) -ne 0 ]]; then
-  command -v sudo >/dev/null || { echo "install_deps: run as root or install sudo" >&2; exit 1; }
-  as_root=(sudo)
+if $with_peers; then
+  absent=()
+  for peer in "${node_peers[@]}"; do
+    if [[ ! -f $peers_folder/node_modules/${peer%@*}/package.json ]]; then absent+=("$peer"); fi
+  done
+  if [[ ${#absent[@]} -eq 0 ]]; then
+    echo "install_deps: all ${#node_peers[@]} packages for Node.js are present in $peers_folder"
+  else
+    echo "install_deps: installing ${absent[*]} in $peers_folder"
+    mkdir -p "$peers_folder"
+    npm install --prefix "$peers_folder" --no-audit --no-fund --ignore-scripts "${absent[@]}"
+  fi
 fi
-echo "install_deps: installing ${missing[*]}"
-"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get update -q
-"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends "${missing[@]}"

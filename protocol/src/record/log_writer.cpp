@@ -10,6 +10,7 @@
 #include "emit/protocol/record/log.hpp"
 #include "emit/protocol/record/mcap_writer.hpp"
 #include "emit/v1/control.pb.h"
+#include "emit/v1/frame.pb.h"
 #include "emit/v1/host.pb.h"
 
 namespace emit::protocol {
@@ -52,8 +53,10 @@ struct LogWriter::Impl {
   McapWriter mcap;
   std::uint16_t host_channel = 0;
   std::uint16_t journal_channel = 0;
+  std::uint16_t frame_channel = 0;  // 0: the log has no such topic
   std::uint32_t host_sequence = 0;
   std::uint32_t journal_sequence = 0;
+  std::uint32_t frame_sequence = 0;
   HostFrameEncoder encoder;
   std::string encoded;
 };
@@ -82,6 +85,11 @@ Result<LogWriter> LogWriter::create(const std::filesystem::path& path,
   if (!journal) return failed(journal.error());
   impl->host_channel = *host;
   impl->journal_channel = *journal;
+  if (options.frames) {
+    auto frames = add_topic(impl->mcap, kFrameTopic, *v1::RecordedFrame::descriptor());
+    if (!frames) return failed(frames.error());
+    impl->frame_channel = *frames;
+  }
   return LogWriter(std::move(impl));
 }
 
@@ -108,6 +116,13 @@ Result<void> LogWriter::write_journal(std::span<const std::byte> encoded_entry,
                                       std::int64_t log_time_ns) {
   return impl_->mcap.write(impl_->journal_channel, ++impl_->journal_sequence, log_time_ns,
                            log_time_ns, encoded_entry);
+}
+
+Result<void> LogWriter::write_frame(const v1::RecordedFrame& frame, std::int64_t log_time_ns) {
+  frame.SerializeToString(&impl_->encoded);
+  return impl_->mcap.write(impl_->frame_channel, ++impl_->frame_sequence, log_time_ns,
+                           std::max<std::int64_t>(frame.sim_time_ns(), 0),
+                           bytes_of(impl_->encoded));
 }
 
 std::uint64_t LogWriter::messages_in_file() const noexcept {

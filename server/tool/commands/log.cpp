@@ -11,8 +11,10 @@
 #include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
 #include "tool/commands/log_commands.hpp"
+#include "tool/streams/frame_log_export.hpp"
 #include "tool/streams/pose_log.hpp"
 #include "tool/support/console.hpp"
+#include "tool/support/frame_files.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
 #include "tool/support/progress.hpp"
@@ -41,6 +43,15 @@ struct ExportOptions {
   std::filesystem::path out;
   std::string table;  ///< empty: all of them
   std::uint16_t host_port = protocol::kDefaultHostPort;
+  std::optional<std::filesystem::path> json;
+};
+
+struct ExportFramesOptions {
+  std::filesystem::path log;
+  std::filesystem::path out;
+  std::optional<double> from_s;
+  std::optional<double> to_s;
+  std::optional<std::uint64_t> run_id;
   std::optional<std::filesystem::path> json;
 };
 
@@ -256,6 +267,51 @@ void add_export_options(CommandLine& line, ExportOptions& options) {
   add_json(line, options.json);
 }
 
+int run_export_frames(const ExportFramesOptions& command) {
+  const auto from_ns = sim_time_ns("--from-s", command.from_s);
+  if (!from_ns) return fail_call(from_ns.error());
+  const auto until_ns = sim_time_ns("--to-s", command.to_s);
+  if (!until_ns) return fail_call(until_ns.error());
+  auto mcap = require_mcap(command.log, "emit record --with-frames writes logs with images");
+  if (!mcap) return fail_call(mcap.error());
+  if (auto made = make_directory(command.out); !made) return fail(made.error());
+  FrameExportOptions options;
+  options.from_ns = *from_ns;
+  options.to_ns = *until_ns;
+  options.run_id = command.run_id;
+  const InterruptGuard interrupt;
+  options.progress = [](std::uint64_t) { return !InterruptGuard::interrupted(); };
+  const auto images = export_log_frames(command.log, command.out, options);
+  if (!images) return fail_call(images.error());
+  if (images->truncation) warn(*images->truncation);
+  fmt::print(text_stream(command.json), "{}: {} images, {} compared with the journal, {} differ\n",
+             command.out.string(), images->images, images->compared, images->differ);
+  if (command.json) {
+    Json json = Json::object();
+    json.set("images", images->images).set("compared", images->compared);
+    json.set("differ", images->differ);
+    if (auto done = write_json(*command.json, json); !done) return fail(done.error());
+  }
+  if (images->differ > 0) {
+    return fail(kExitFailure, fmt::format("{} images differ from the journal, the first is that of "
+                                          "frame {}",
+                                          images->differ, images->first_differing));
+  }
+  return kExitOk;
+}
+
+void add_export_frames_options(CommandLine& line, ExportFramesOptions& options) {
+  line.path("log", options.log, "MCAP log with images (emit record --with-frames)").required();
+  line.output_folder("--out", options.out, "Folder for frame_NNNNNN.exr").required();
+  line.option("--from-s", options.from_s, "First simulation time; default: the begin")
+      .type_name("S");
+  line.option("--to-s", options.to_s, "Last simulation time; default: the end").type_name("S");
+  line.option("--run-id", options.run_id,
+              "Run to export; needed where several runs have images in the range")
+      .type_name("N");
+  add_json(line, options.json);
+}
+
 }  // namespace
 
 void add_log(CommandLine& tool) {
@@ -266,7 +322,8 @@ void add_log(CommandLine& tool) {
       "Example: emit log info run.mcap\n"
       "         emit log cut run.mcap --from-s 10 --to-s 12.5 --out cut.mcap\n"
       "         emit log merge journal.*.mcap journal.mcap --out all.mcap\n"
-      "         emit log export csv run.mcap --out tables");
+      "         emit log export csv run.mcap --out tables\n"
+      "         emit log export exr run.mcap --out frames");
   add_log_info(log);
   log.command<CutOptions>(
       {.name = "cut",
@@ -286,6 +343,11 @@ void add_log(CommandLine& tool) {
        .text = "Write poses, entities, frames with flags, weather and events as CSV tables",
        .example = "emit log export csv run.mcap --table frames --out frames.csv"},
       add_export_options, run_export);
+  tables.command<ExportFramesOptions>(
+      {.name = "exr",
+       .text = "Write the images of a log as OpenEXR, and compare them with its journal",
+       .example = "emit log export exr run.mcap --out frames"},
+      add_export_frames_options, run_export_frames);
 }
 
 }  // namespace emit::tool

@@ -19,9 +19,9 @@ Json json_of(const google::protobuf::RepeatedPtrField<v1::ConfigValue>& values) 
 std::string setup_text(const protocol::LogRunOutline& run) {
   if (run.recording == nullptr) return "not recorded: the daemon was an older one";
   const v1::Recording& setup = *run.recording;
-  std::string text = fmt::format("{} values of the scenario, {} of the daemon, {} files, {} channels",
-                                 setup.scenario_size(), setup.daemon_size(), setup.files_size(),
-                                 setup.channels_size());
+  std::string text = fmt::format(
+      "{} values of the scenario, {} of the daemon, {} files, {} channels", setup.scenario_size(),
+      setup.daemon_size(), setup.files_size(), setup.channels_size());
   if (setup.values_left_out() > 0) {
     text += fmt::format("; no room for {} more", setup.values_left_out());
   }

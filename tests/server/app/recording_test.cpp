@@ -77,9 +77,9 @@ TEST(Recording, stays_below_the_limit_of_a_record) {
   EXPECT_LE(out.ByteSizeLong(), kMaxRecordedBytes);
   EXPECT_GT(out.daemon_size(), 0);
   EXPECT_GT(out.values_left_out(), 0U);
-  EXPECT_EQ(static_cast<std::uint32_t>(out.scenario_size() + out.files_size()) +
-                out.values_left_out(),
-            40'000U + 2U);
+  EXPECT_EQ(
+      static_cast<std::uint32_t>(out.scenario_size() + out.files_size()) + out.values_left_out(),
+      40'000U + 2U);
 }
 
 TEST(CompareSetup, like_setups_have_no_difference) {
@@ -114,14 +114,14 @@ TEST(CompareSetup, names_keys_and_files_of_another_scenario) {
   scenario.files.pop_back();
   fill(&scenario, nullptr, {}, ours);
   const auto differences = compare_setup(kOrigin, &theirs, other_scenario(), ours);
-  EXPECT_THAT(texts(differences),
-              ElementsAre("scenario: recorded box (SHA-256 aa), here box (SHA-256 bb)",
-                          "thermal.steps: recorded 6, here 7",
-                          "thermal.gone: recorded 1, here nothing",
-                          "object[truck].scale: recorded 1.0, here 2.0",
-                          "thermal.new: recorded nothing, here 2",
-                          "file box.glb: recorded 12 bytes, SHA-256 0f, here 12 bytes, SHA-256 ff",
-                          "file box.bin: recorded 34 bytes, SHA-256 1f, here nothing"));
+  EXPECT_THAT(
+      texts(differences),
+      ElementsAre("scenario: recorded box (SHA-256 aa), here box (SHA-256 bb)",
+                  "thermal.steps: recorded 6, here 7", "thermal.gone: recorded 1, here nothing",
+                  "object[truck].scale: recorded 1.0, here 2.0",
+                  "thermal.new: recorded nothing, here 2",
+                  "file box.glb: recorded 12 bytes, SHA-256 0f, here 12 bytes, SHA-256 ff",
+                  "file box.bin: recorded 34 bytes, SHA-256 1f, here nothing"));
   EXPECT_EQ(std::ranges::count_if(differences, &SetupDifference::is_decisive), 1);
 }
 
@@ -131,8 +131,7 @@ TEST(CompareSetup, canned_frames_are_no_scenario) {
   const auto differences = compare_setup(canned, nullptr, kOrigin, {});
   ASSERT_EQ(differences.size(), 1U);
   EXPECT_TRUE(differences[0].is_decisive());
-  EXPECT_EQ(differences[0].text(),
-            "scenario: recorded canned frames, here box (SHA-256 aa)");
+  EXPECT_EQ(differences[0].text(), "scenario: recorded canned frames, here box (SHA-256 aa)");
 }
 
 TEST(CompareSetup, other_channels_are_decisive) {

@@ -46,8 +46,7 @@ class Tap {
   [[nodiscard]] std::vector<std::string> taken() const {
     std::vector<std::string> out;
     std::array<char, 65536> bytes{};
-    for (ssize_t got = 0;
-         (got = ::recv(fd_, bytes.data(), bytes.size(), MSG_DONTWAIT)) >= 0;) {
+    for (ssize_t got = 0; (got = ::recv(fd_, bytes.data(), bytes.size(), MSG_DONTWAIT)) >= 0;) {
       out.emplace_back(bytes.data(), static_cast<std::size_t>(got));
     }
     return out;

@@ -57,6 +57,7 @@ const std::vector<OutputCase>& output_cases() {
     add({"log", "export", "csv", "no.mcap", "--table", "frames", "--out", "GOOD"},
         {"--out", "--json"});
     add({"log", "export", "csv", "no.mcap"}, {}, {"--out"});
+    add({"log", "export", "exr", "no.mcap", "--out", "GOOD"}, {"--json"}, {"--out"});
     add({"fit", "block-on-road"}, {"--out", "--json"});
     add({"generate", "box", "--out", "GOOD"}, {}, {"--out"});
     add({"make-log", "airfield", "--out", "GOOD"}, {"--out"});

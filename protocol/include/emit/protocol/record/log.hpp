@@ -16,14 +16,17 @@
 namespace emit::v1 {
 class HostFrame;
 class JournalEntry;
+class RecordedFrame;
 }  // namespace emit::v1
 
 /// Logs of emitd (docs/wire.md section 6): MCAP files with the topics `host` (emit.v1.HostFrame)
-/// and `journal` (emit.v1.JournalEntry). They describe themselves, so any MCAP tool reads them.
+/// and `journal` (emit.v1.JournalEntry), and on request `frames` (emit.v1.RecordedFrame). They
+/// describe themselves, so any MCAP tool reads them.
 namespace emit::protocol {
 
 inline constexpr const char* kHostTopic = "host";
 inline constexpr const char* kJournalTopic = "journal";
+inline constexpr const char* kFrameTopic = "frames";  ///< read by FrameLogReader
 
 /// Topic of a message in a log.
 enum class LogTopic : std::uint8_t { host, journal };
@@ -37,6 +40,7 @@ struct LogWriterOptions {
   std::uint32_t chunk_bytes = 256u << 10;
   std::int64_t flush_interval_ns = 100'000'000;
   std::string software{};  ///< name of the writing software, for the file's header
+  bool frames = false;     ///< the log gets the topic `frames` too
 };
 
 /// Writes a log.
@@ -68,6 +72,10 @@ class LogWriter {
   /// write_host().
   [[nodiscard]] physics::Result<void> write_journal(std::span<const std::byte> encoded_entry,
                                                     std::int64_t log_time_ns);
+  /// Writes the image of a frame. Errors as for write_host(); also invalid_argument where
+  /// LogWriterOptions::frames is not set.
+  [[nodiscard]] physics::Result<void> write_frame(const v1::RecordedFrame& frame,
+                                                  std::int64_t log_time_ns);
   /// Returns the number of messages that the kernel has taken. The others wait for flush() or are
   /// lost by a failure.
   [[nodiscard]] std::uint64_t messages_in_file() const noexcept;
