@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Program that writes the binary seeds of corpus/: make_corpus FOLDER. Text seeds and former
 // findings (regression_*) are kept in the corpus as they are.
+#include <bit>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -15,12 +16,14 @@
 #include "emit/protocol/host_session.hpp"
 #include "emit/protocol/net_fdm.hpp"
 #include "emit/protocol/pixel_codec.hpp"
+#include "emit/protocol/record/frame_log.hpp"
 #include "emit/protocol/record/log.hpp"
 #include "emit/protocol/resend.hpp"
 #include "emit/protocol/trigger.hpp"
 #include "emit/protocol/trigger_seal.hpp"
 #include "emit/scenegen/generate.hpp"
 #include "emit/v1/control.pb.h"
+#include "emit/v1/frame.pb.h"
 #include "fuzz/state_world.hpp"
 #include "protocol/cigi/cigi_samples.hpp"
 #include "protocol/dis/dis_samples.hpp"
@@ -388,6 +391,29 @@ void make_fragment_seeds() {
   write("fragments", "lossy", lossy);
 }
 
+/// Writes a log with an image that compresses and one that does not.
+void make_image_log_seed() {
+  protocol::LogWriterOptions options;
+  options.frames = true;
+  auto writer = protocol::LogWriter::create(seed("mcap_log", "images.mcap"), options);
+  if (!writer) std::abort();
+  constexpr std::uint32_t kWidthPx = 8;
+  constexpr std::uint32_t kHeightPx = 6;
+  for (const bool smooth : {true, false}) {
+    std::vector<float> pixels(kWidthPx * kHeightPx, 20.0F);
+    for (std::size_t i = 0; i < pixels.size() && !smooth; ++i) {
+      pixels[i] = std::bit_cast<float>(static_cast<std::uint32_t>((i + 1) * 2654435761U));
+    }
+    v1::RecordedFrame image;
+    image.set_width_px(kWidthPx);
+    image.set_height_px(kHeightPx);
+    protocol::PixelEncoder encoder(pixels.size() * sizeof(float));
+    protocol::set_pixels(image, pixels, encoder);
+    static_cast<void>(writer->write_frame(image, 5'000'000));
+  }
+  static_cast<void>(writer->close());
+}
+
 void make_log_seeds() {
   for (const auto& [name, chunk_bytes] :
        {std::pair("chunks.mcap", 1024u), std::pair("plain.mcap", 0u)}) {
@@ -403,6 +429,7 @@ void make_log_seeds() {
     }
     static_cast<void>(writer->close());
   }
+  make_image_log_seed();
 }
 
 Bytes ipv4_udp(const Bytes& payload) {

@@ -44,9 +44,9 @@ struct FrameLogReader::Impl {
   PixelDecoder decoder;
 
   tl::unexpected<physics::Error> fail(std::string_view text) const {
-    return physics::make_error(ErrorCode::parse, fmt::format("{}: offset {}: {}",
-                                                             mcap.path().string(),
-                                                             mcap.message().file_offset, text));
+    return physics::make_error(
+        ErrorCode::parse,
+        fmt::format("{}: offset {}: {}", mcap.path().string(), mcap.message().file_offset, text));
   }
 
   Result<void> take() {

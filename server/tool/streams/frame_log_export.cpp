@@ -75,8 +75,7 @@ Result<std::uint64_t> choose(const std::filesystem::path& file, const protocol::
 
 Result<void> write_image(const std::filesystem::path& folder, const v1::RecordedFrame& frame,
                          std::span<const float> pixels) {
-  const auto header =
-      protocol::decode_frame_header(std::as_bytes(std::span(frame.header())));
+  const auto header = protocol::decode_frame_header(std::as_bytes(std::span(frame.header())));
   if (!header) return tl::unexpected(header.error());
   const v1::ChannelInfo& channel = frame.channel();
   FramePlanes planes;
@@ -92,9 +91,8 @@ Result<void> write_image(const std::filesystem::path& folder, const v1::Recorded
   for (int i = 0; i < samples; ++i) {
     response.push_back({channel.response_um(i), channel.response_frac(i)});
   }
-  planes.metadata = {frame.sim_time_ns(), frame.frame_number(), header->pose,
-                     channel.band(),      channel.band_lo_um(), channel.band_hi_um(),
-                     frame.unit(),        response};
+  planes.metadata = {frame.sim_time_ns(),  frame.frame_number(), header->pose, channel.band(),
+                     channel.band_lo_um(), channel.band_hi_um(), frame.unit(), response};
   return write_frame_exr(folder / fmt::format("frame_{:06}.exr", frame.frame_number()), planes);
 }
 

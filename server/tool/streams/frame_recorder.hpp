@@ -56,8 +56,8 @@ class FrameRecorder {
   std::unique_ptr<client::FrameClient> client_;
   client::ChannelDescription channel_;
   protocol::PixelEncoder encoder_;
-  std::uint64_t run_id_ = 0;                // of the newest run start in the journal
-  std::optional<Key> newest_in_journal_;    // frame that the channel shows
+  std::uint64_t run_id_ = 0;              // of the newest run start in the journal
+  std::optional<Key> newest_in_journal_;  // frame that the channel shows
   std::optional<Key> newest_image_;
   std::map<Key, std::uint32_t> of_journal_;  // checksums that wait for the image
   std::map<Key, std::uint32_t> of_images_;   // checksums that wait for the journal

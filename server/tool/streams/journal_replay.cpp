@@ -205,7 +205,6 @@ class JournalReplay {
     if (!log) return tl::unexpected(log.error());
     std::size_t runs_begun = 0;
     std::uint64_t last_sequence = 0;
-    bool showing = false;
     daemon_.player.reset();
     while (!ended_ && !InterruptGuard::interrupted()) {
       const auto more = log->next();
@@ -231,8 +230,6 @@ class JournalReplay {
         const std::int64_t at_ns = entry.frame().sim_time_ns();
         if (wanted && at_ns > range_.to_ns) break;
         shown = wanted && at_ns >= range_.from_ns;
-        if (shown && !showing) pace_.restart();
-        showing = showing || shown;
         if (shown && !may_show(entry)) break;
       }
       if (auto applied = apply(entry, shown); !applied) return applied;

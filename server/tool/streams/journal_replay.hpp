@@ -75,8 +75,8 @@ struct JournalReplaySummary {
 /// A part of a log is a range of one run. Everything since the start of the daemon that recorded it
 /// is rendered first, without being shown, so that the frames of the range have the pixels of a
 /// whole replay. A merged log may hold several daemons, one behind the other: each begins with a
-/// surface that is warmed up anew, and so does each pass. The pace begins anew there, and at the
-/// range.
+/// surface that is warmed up anew, and so does each pass. The pace begins anew there. Frames before
+/// the range are not paced.
 ///
 /// Warns on standard error of every difference from the recording, by name.
 /// Errors: those of the log reader, the renderer and the player; config (the scenario or the

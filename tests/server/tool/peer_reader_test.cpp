@@ -38,9 +38,10 @@ TEST(PeerReader, another_program_reads_a_journal_by_its_index) {
   const std::string log = folder.write("poses.csv", poses);
   {
     DaemonProcess daemon(
-        folder, {"--config", folder.write("emitd.toml", canned_config(64, 48, "mode = \"host-step\"",
-                                                                      "[journal]\nfile = "
-                                                                      "\"journal.mcap\"\n"))});
+        folder,
+        {"--config", folder.write("emitd.toml", canned_config(64, 48, "mode = \"host-step\"",
+                                                              "[journal]\nfile = "
+                                                              "\"journal.mcap\"\n"))});
     ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
     const ProcessResult sent =
         run_emit({"send", log, "--to", "tcp://" + daemon.control(), "--step"});
@@ -49,9 +50,9 @@ TEST(PeerReader, another_program_reads_a_journal_by_its_index) {
     ASSERT_EQ(daemon.wait(), 0);
   }
   const std::string journal = folder.file("journal.mcap");
-  const ProcessResult peer = run_process(
-      {"env", "NODE_PATH=" + modules, "node", EMIT_TEST_SOURCE_DIR "/server/tool/peers/read_journal.js",
-       journal});
+  const ProcessResult peer =
+      run_process({"env", "NODE_PATH=" + modules, "node",
+                   EMIT_TEST_SOURCE_DIR "/server/tool/peers/read_journal.js", journal});
   ASSERT_EQ(peer.exit_code, 0) << peer.err;
 
   std::string run_id;

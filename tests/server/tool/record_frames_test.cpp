@@ -69,9 +69,9 @@ TEST_F(RecordFrames, are_the_images_that_a_client_received) {
   EXPECT_THAT(exported.out, HasSubstr("6 images, 6 compared with the journal, 0 differ"));
   for (std::size_t i = 1; i <= kFrames; ++i) {
     const std::string name = fmt::format("frame_{:06}.exr", i);
-    const ProcessResult same = run_emit({"compare", folder_.file("received/" + name),
-                                         folder_.file("exported/" + name), "--json",
-                                         folder_.file("compare.json")});
+    const ProcessResult same =
+        run_emit({"compare", folder_.file("received/" + name), folder_.file("exported/" + name),
+                  "--json", folder_.file("compare.json")});
     EXPECT_EQ(same.exit_code, 0) << same.err;
     EXPECT_EQ(json_value(folder_.read("compare.json"), "identical"), "true") << name;
   }
@@ -85,8 +85,8 @@ TEST_F(RecordFrames, a_range_of_them_is_exported) {
   EXPECT_TRUE(std::filesystem::exists(folder_.file("exported/frame_000004.exr")));
   EXPECT_FALSE(std::filesystem::exists(folder_.file("exported/frame_000002.exr")));
   EXPECT_FALSE(std::filesystem::exists(folder_.file("exported/frame_000005.exr")));
-  const ProcessResult none = run_emit(
-      {"log", "export", "exr", log_, "--from-s", "9", "--out", folder_.file("exported")});
+  const ProcessResult none =
+      run_emit({"log", "export", "exr", log_, "--from-s", "9", "--out", folder_.file("exported")});
   EXPECT_EQ(none.exit_code, 2);
   EXPECT_THAT(none.err, HasSubstr("no frame from 9 s on"));
 }
@@ -116,8 +116,8 @@ TEST(ExportFrames, a_log_without_images_says_how_to_get_them) {
                       folder.file("poses.mcap")})
                 .exit_code,
             0);
-  const ProcessResult result = run_emit(
-      {"log", "export", "exr", folder.file("poses.mcap"), "--out", folder.file("frames")});
+  const ProcessResult result =
+      run_emit({"log", "export", "exr", folder.file("poses.mcap"), "--out", folder.file("frames")});
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("emit record --with-frames"));
 }
