@@ -67,8 +67,6 @@ physics::Result<std::optional<ReplayedFrame>> JournalPlayer::apply(const v1::Jou
     weather_.clear();
     render_number_ = 0;
     run_id_ = entry.run_start().run_id();
-    scenario_sha256_ = entry.run_start().scenario_sha256();
-    device_ = entry.run_start().device();
     started_ = true;
     return std::optional<ReplayedFrame>();
   }

@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "agents/channel_table.hpp"
@@ -60,10 +59,6 @@ class JournalPlayer {
 
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
   [[nodiscard]] std::uint64_t mismatches() const noexcept { return mismatches_; }
-  /// Returns the hash of the scenario in the newest RunStart, to compare with the scenario at hand.
-  /// It is empty before the first one.
-  [[nodiscard]] const std::string& scenario_sha256() const noexcept { return scenario_sha256_; }
-  [[nodiscard]] const std::string& device() const noexcept { return device_; }
 
  private:
   struct PendingWeather;
@@ -83,8 +78,6 @@ class JournalPlayer {
   std::uint64_t render_number_ = 0;
   std::uint64_t frames_ = 0;
   std::uint64_t mismatches_ = 0;
-  std::string scenario_sha256_;
-  std::string device_;
 };
 
 }  // namespace emit::server
