@@ -123,7 +123,8 @@ std::string build_text(std::string_view program) {
 
 void fill(const ScenarioIdentity* identity, const config::DaemonConfig* daemon,
           const std::vector<Channel>& channels, v1::Recording& out) {
-  std::size_t room_bytes = kMaxRecordedBytes;
+  for (const Channel& channel : channels) fill(channel, *out.add_channels());
+  std::size_t room_bytes = kMaxRecordedBytes - std::min(out.ByteSizeLong(), kMaxRecordedBytes);
   std::uint32_t left_out = 0;
   // The daemon's keys are few, and a large scene must not push them out.
   if (daemon != nullptr) {
@@ -144,7 +145,6 @@ void fill(const ScenarioIdentity* identity, const config::DaemonConfig* daemon,
       added.set_bytes(file.bytes);
     }
   }
-  for (const Channel& channel : channels) fill(channel, *out.add_channels());
   out.set_values_left_out(left_out);
 }
 

@@ -15,7 +15,7 @@ class Recording;
 
 namespace emit::server {
 
-/// Room for the values of a configuration in a RunStart, bytes. A control record holds 1 MiB.
+/// Room for channels and values in a RunStart, bytes. A control record holds 1 MiB.
 inline constexpr std::size_t kMaxRecordedBytes = 512u << 10;
 /// Longest value that is recorded as it is, bytes. A longer one is recorded as its hash.
 inline constexpr std::size_t kMaxRecordedValueBytes = 200;
@@ -24,7 +24,8 @@ inline constexpr std::size_t kMaxRecordedValueBytes = 200;
 [[nodiscard]] std::string build_text(std::string_view program);
 
 /// Describes the setup of a daemon for the journal: scenario and configuration key by key, the
-/// files of the scene and the channels. Values beyond kMaxRecordedBytes are left out and counted.
+/// files of the scene and the channels. Values and files beyond kMaxRecordedBytes are left out and
+/// counted.
 /// @param identity  of the scenario; null: canned frames
 /// @param daemon    null: not a daemon but a replay
 void fill(const ScenarioIdentity* identity, const config::DaemonConfig* daemon,
