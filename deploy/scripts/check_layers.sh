@@ -58,14 +58,15 @@ server/client: server/net server/rt protocol renderer/physics
 server/pacing: protocol renderer/include renderer/physics renderer/scene
 server/motion: protocol renderer/physics
 server/gnss: protocol renderer/physics
+server/output: protocol renderer/image renderer/physics renderer/scene
 server/telemetry: server/host server/net server/rt config/include protocol renderer/physics
 server/gateway: server/host server/motion server/net server/rt server/telemetry config/include protocol renderer/physics renderer/reference renderer/scene
-server/agents: server/gateway server/host server/motion server/pacing server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
+server/agents: server/gateway server/host server/motion server/output server/pacing server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
 server/agents/sender: server/agents server/net server/rt config/include protocol renderer/physics
 server/agents/receiver: server/agents server/agents/sender server/net server/rt config/include protocol renderer/physics
 server/agents/conductor: server/agents server/gateway server/motion server/net server/pacing server/rt config/include protocol renderer/physics
 server/agents/recorder: server/agents server/net server/rt config/include protocol renderer/physics
-server/agents/render: server/agents server/pacing renderer/image renderer/physics
+server/agents/render: server/agents server/motion server/pacing renderer/image renderer/physics
 server/agents/motion: server/agents server/motion server/net server/rt config/include protocol renderer/physics renderer/scene
 server/agents/gateway: server/agents server/gateway server/net server/rt config/include protocol renderer/physics renderer/scene
 server/app: server/host server/agents server/agents/conductor server/agents/gateway server/gateway server/agents/motion server/agents/receiver server/agents/recorder server/agents/render server/agents/sender server/motion server/net server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
@@ -76,7 +77,7 @@ server/tool/view: server/tool/support server/tool/streams server/client renderer
 server/bench/stability: server/tool/command_line server/tool/support renderer/image renderer/include renderer/physics renderer/scene renderer/verify
 server/bench/accuracy: server/tool/command_line server/tool/support server/bench/stability renderer/image renderer/include renderer/physics renderer/reference renderer/scene renderer/threads renderer/verify
 server/bench/frame_time: server/tool/command_line server/tool/support server/bench/accuracy server/bench/stability server/pacing renderer/include renderer/physics renderer/reference renderer/scene renderer/scene/generate
-server/bench/stream: server/tool/command_line server/tool/support server/tool/streams server/agents server/client server/net server/rt config/include protocol renderer/physics
+server/bench/stream: server/tool/command_line server/tool/support server/tool/streams server/agents server/client server/net server/output server/rt config/include protocol renderer/image renderer/physics renderer/scene
 server/tool/commands: server/tool/command_line server/tool/support server/tool/streams server/tool/view server/gnss server/motion server/agents/render server/app server/client server/net server/rt config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
 server/tool/lab: server/tool/command_line server/tool/support server/tool/commands server/bench/accuracy server/bench/frame_time server/bench/stability server/bench/stream config/include renderer/image renderer/physics renderer/reference renderer/scene renderer/verify
 server/tool: server/tool/commands server/tool/lab server/tool/support

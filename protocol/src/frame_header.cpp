@@ -15,8 +15,8 @@ namespace {
 using physics::ErrorCode;
 using physics::make_error;
 
-// Offsets of the fields (docs/wire.md section 3). The bytes behind kReservedAt, kReservedMotionAt
-// and kReservedBehindAt are zero.
+// Offsets of the fields (docs/wire.md section 3). The bytes behind kReservedAt and
+// kReservedMotionAt are zero.
 enum Offset : std::size_t {
   kMagicAt = 0,
   kVersionAt = 4,
@@ -53,7 +53,9 @@ enum Offset : std::size_t {
   kQuaternionAt = 192,
   kQualityRungAt = 224,
   kEncodingAt = 225,
-  kReservedAt = 226,
+  kOutputStepsAt = 226,
+  kReservedAt = 227,
+  kAppliedShiftXAt = 228,
   kPreviousJitterAt = 232,
   kSlotBeginAt = 240,
   kTriggerNumberAt = 248,
@@ -72,7 +74,7 @@ enum Offset : std::size_t {
   kShiftYAt = 296,
   kPointingErrorAt = 300,
   kDisplayAt = 304,
-  kReservedBehindAt = 312,
+  kAppliedShiftYAt = 312,
   kCrcAt = 316,
 };
 static_assert(kCrcAt + 4 == kFrameHeaderBytes);
@@ -173,7 +175,9 @@ void encode(const FrameHeader& header, std::span<std::byte, kFrameHeaderBytes> o
   wire::put(to, kQuaternionAt + 24, attitude.z);
   wire::put(to, kQualityRungAt, header.quality_rung);
   wire::put(to, kEncodingAt, static_cast<std::uint8_t>(header.encoding));
-  std::ranges::fill(to.subspan(kReservedAt, kPreviousJitterAt - kReservedAt), std::byte{0});
+  wire::put(to, kOutputStepsAt, header.output_steps);
+  wire::put(to, kReservedAt, std::uint8_t{0});
+  wire::put(to, kAppliedShiftXAt, header.applied_shift_x_px);
   wire::put(to, kPreviousJitterAt, header.previous_jitter_ns);
   wire::put(to, kSlotBeginAt, header.slot_begin_ns);
   wire::put(to, kTriggerNumberAt, header.trigger_number);
@@ -192,7 +196,7 @@ void encode(const FrameHeader& header, std::span<std::byte, kFrameHeaderBytes> o
   wire::put(to, kShiftYAt, header.shift_y_px);
   wire::put(to, kPointingErrorAt, header.pointing_error_px);
   wire::put(to, kDisplayAt, header.display_ns);
-  std::ranges::fill(to.subspan(kReservedBehindAt, kCrcAt - kReservedBehindAt), std::byte{0});
+  wire::put(to, kAppliedShiftYAt, header.applied_shift_y_px);
   wire::put(to, kCrcAt, crc32c(to.first(kCrcAt)));
 }
 
@@ -212,7 +216,8 @@ HeaderFault parse_frame_header(std::span<const std::byte> bytes, FrameHeader& he
   if (format != static_cast<std::uint8_t>(PixelFormat::float32)) return HeaderFault::format;
   const auto quantity = wire::get<std::uint8_t>(bytes, kQuantityAt);
   if (quantity != static_cast<std::uint8_t>(PixelQuantity::radiance_w_m2_sr) &&
-      quantity != static_cast<std::uint8_t>(PixelQuantity::temperature_k)) {
+      quantity != static_cast<std::uint8_t>(PixelQuantity::temperature_k) &&
+      quantity != static_cast<std::uint8_t>(PixelQuantity::drive)) {
     return HeaderFault::quantity;
   }
   const auto encoding = wire::get<std::uint8_t>(bytes, kEncodingAt);
@@ -273,6 +278,9 @@ HeaderFault parse_frame_header(std::span<const std::byte> bytes, FrameHeader& he
   header.shift_y_px = wire::get<float>(bytes, kShiftYAt);
   header.pointing_error_px = wire::get<float>(bytes, kPointingErrorAt);
   header.display_ns = wire::get<std::int64_t>(bytes, kDisplayAt);
+  header.output_steps = wire::get<std::uint8_t>(bytes, kOutputStepsAt);
+  header.applied_shift_x_px = wire::get<float>(bytes, kAppliedShiftXAt);
+  header.applied_shift_y_px = wire::get<float>(bytes, kAppliedShiftYAt);
 
   const std::uint64_t expected = expected_payload_bytes(header.width_px, header.height_px);
   if (expected == 0 || header.payload_bytes != expected) return HeaderFault::payload_size;

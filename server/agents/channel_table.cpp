@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "emit/protocol/frame_header.hpp"
 
@@ -18,13 +19,29 @@ std::string_view to_string(scene::ChannelKind kind) noexcept {
 
 namespace {
 
-/// Takes the memory of an image whose rows do not lie in one piece.
+/// Takes the memory of an image whose pixels are not used where they lie in the source's memory.
 void add_copies(Picture& picture, const SourceInfo& source) {
-  const scene::PixelRect& window = picture.window_px;
-  if (window.width_px != source.width_px) {
-    picture.copies.assign(source.slots,
-                          std::vector<float>(std::size_t{window.width_px} * window.height_px));
+  if (picture.chain || picture.window_px.width_px != source.width_px) {
+    picture.copies.assign(source.slots, std::vector<float>(picture.pixels()));
   }
+}
+
+/// Returns the focal length of the image of a scenario's sensor, px; 0 without one.
+double focal_px_of(const std::optional<scene::ScenarioDesc>& scenario) {
+  if (!scenario || scenario->sensor.fov_h_rad <= 0.0) return 0.0;
+  return 0.5 * scenario->sensor.width_px / std::tan(0.5 * scenario->sensor.fov_h_rad);
+}
+
+/// Makes the output of an image, where it has one, and its size.
+physics::Result<void> make_output(Picture& picture, const protocol::ImageSize& image,
+                                  double focal_px) {
+  picture.size = {picture.window_px.width_px, picture.window_px.height_px};
+  if (picture.output == scene::ChannelOutput{}) return {};
+  auto chain = OutputChain::make(picture.output, {image, picture.window_px, focal_px});
+  if (!chain) return tl::unexpected(std::move(chain.error()));
+  picture.chain = std::move(*chain);
+  picture.size = picture.chain->frame();
+  return {};
 }
 
 bool fits(const scene::PixelRect& window, const SourceInfo& source) noexcept {
@@ -52,18 +69,20 @@ physics::Result<ChannelTable> make_channels(const std::optional<scene::ScenarioD
     channel.band_lo_um = band.lo_um;
     channel.band_hi_um = band.hi_um;
     channel.response = band.response;
-    channel.width_px = window.width_px;
-    channel.height_px = window.height_px;
-    channel.window_x_px = window.x_px;
-    channel.window_y_px = window.y_px;
+    channel.window_px = window;
     channel.sensor_width_px = source.width_px;
     channel.sensor_height_px = source.height_px;
     channel.every_nth = wanted.every_nth;
-    auto picture = std::find_if(
-        table.pictures.begin(), table.pictures.end(),
-        [&](const Picture& other) { return other.plane == plane && other.window_px == window; });
+    auto picture =
+        std::find_if(table.pictures.begin(), table.pictures.end(), [&](const Picture& other) {
+          return other.plane == plane && other.window_px == window && other.output == wanted.output;
+        });
     if (picture == table.pictures.end()) {
-      picture = table.pictures.insert(picture, {plane, window, 0, {}});
+      Picture made;
+      made.plane = plane;
+      made.window_px = window;
+      made.output = wanted.output;
+      picture = table.pictures.insert(picture, std::move(made));
     }
     picture->channels |= ChannelSet{1} << (channel.index % kMaxChannels);
     channel.picture = static_cast<std::size_t>(picture - table.pictures.begin());
@@ -73,8 +92,8 @@ physics::Result<ChannelTable> make_channels(const std::optional<scene::ScenarioD
     const std::string where = scenario ? scenario->file.string() : std::string("source");
     if (table.channels.size() > kMaxChannels || table.pictures.size() > kMaxPictures) {
       return make_error(ErrorCode::config,
-                        fmt::format("{}: {} channels of {} bands and windows, at most {} of {} can "
-                                    "be streamed",
+                        fmt::format("{}: {} channels of {} bands, windows and outputs, at most {} "
+                                    "of {} can be streamed",
                                     where, table.channels.size(), table.pictures.size(),
                                     kMaxChannels, kMaxPictures));
     }
@@ -86,8 +105,22 @@ physics::Result<ChannelTable> make_channels(const std::optional<scene::ScenarioD
                                       where, channel.name, source.width_px, source.height_px));
       }
     }
-    for (Picture& picture : table.pictures) {
-      add_copies(picture, source);
+    const double focal_px = focal_px_of(scenario);
+    for (Channel& channel : table.channels) {
+      Picture& picture = table.pictures[channel.picture];
+      if (picture.pixels() == 0) {
+        if (auto made = make_output(picture, {source.width_px, source.height_px}, focal_px);
+            !made) {
+          return tl::unexpected(
+              std::move(made.error())
+                  .with_context(fmt::format("{}: channel '{}'", where, channel.name)));
+        }
+        add_copies(picture, source);
+      }
+      channel.width_px = picture.size.width_px;
+      channel.height_px = picture.size.height_px;
+      channel.source_px = picture.chain ? picture.chain->source_px() : picture.window_px;
+      channel.output_steps = picture.chain ? picture.chain->steps() : std::uint8_t{0};
     }
     return std::move(table);
   };
@@ -151,8 +184,7 @@ scene::PixelRect window_around(const std::vector<Channel>& channels, ChannelSet 
     if ((of >> channel.index & 1U) == 0) {
       continue;
     }
-    const scene::PixelRect one{channel.window_x_px, channel.window_y_px, channel.width_px,
-                               channel.height_px};
+    const scene::PixelRect& one = channel.source_px;
     if (all.empty()) {
       all = one;
       continue;
@@ -167,21 +199,36 @@ scene::PixelRect window_around(const std::vector<Channel>& channels, ChannelSet 
   return all;
 }
 
-std::span<const float> cut_out(Picture& picture, const renderer::FrameView& view,
-                               renderer::SlotIndex slot) noexcept {
+physics::Result<void> check_outputs(const scene::ScenarioDesc& scenario) {
+  SourceInfo source;
+  source.width_px = scenario.sensor.width_px;
+  source.height_px = scenario.sensor.height_px;
+  source.planes = scenario.bands.size();
+  const auto table = make_channels(scenario, source);
+  if (!table) return tl::unexpected(table.error());
+  return {};
+}
+
+TakenPicture take_picture(Picture& picture, const renderer::FrameView& view,
+                          renderer::SlotIndex slot, const glm::vec2& shift_px) noexcept {
   const std::span<const float> plane = view.radiance_w_m2_sr[picture.plane];
+  if (picture.chain) {
+    std::vector<float>& made = picture.copies[slot];
+    const std::uint32_t clamped_px = picture.chain->apply(plane, shift_px, made);
+    return {made, clamped_px};
+  }
   const scene::PixelRect& window = picture.window_px;
   const std::size_t first = std::size_t{window.y_px} * view.width_px + window.x_px;
   const std::size_t pixels = std::size_t{window.width_px} * window.height_px;
   if (picture.copies.empty()) {
-    return plane.subspan(first, pixels);
+    return {plane.subspan(first, pixels), 0};
   }
   std::vector<float>& copy = picture.copies[slot];
   for (std::size_t row = 0; row < window.height_px; ++row) {
     std::copy_n(plane.begin() + static_cast<std::ptrdiff_t>(first + row * view.width_px),
                 window.width_px, copy.begin() + static_cast<std::ptrdiff_t>(row * window.width_px));
   }
-  return copy;
+  return {copy, 0};
 }
 
 }  // namespace emit::server

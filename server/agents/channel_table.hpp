@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "agents/messages.hpp"
+#include "emit/protocol/output_geometry.hpp"
 #include "emit/scene/scene_desc.hpp"
+#include "output/output_chain.hpp"
 
 namespace emit::server {
 
@@ -23,20 +25,30 @@ struct Channel {
   std::vector<scene::ResponseSample> response;  ///< response of the band; empty: a rectangle
   std::uint32_t width_px = 0;                   ///< width of its frames
   std::uint32_t height_px = 0;
-  std::uint32_t window_x_px = 0;  ///< place of its frames in the sensor's image
-  std::uint32_t window_y_px = 0;
+  scene::PixelRect window_px;     ///< part of the sensor's image that its frames show
+  scene::PixelRect source_px;     ///< part that they are made of: the window and what is around it
+  std::uint8_t output_steps = 0;  ///< protocol::OutputSteps
   std::uint32_t sensor_width_px = 0;
   std::uint32_t sensor_height_px = 0;
   std::uint32_t every_nth = 1;  ///< shows frames 1, 1 + n, 1 + 2 n, ... of every run
   std::size_t picture = 0;      ///< index into Image::pictures
 };
 
-/// Pixels that channels of one band and window share.
+/// Pixels that channels of one band, window and output share.
 struct Picture {
   std::size_t plane = 0;                   ///< index into FrameView::radiance_w_m2_sr
   scene::PixelRect window_px;              ///< part of the sensor's image
+  scene::ChannelOutput output;             ///< settings of the chain
   ChannelSet channels = 0;                 ///< channels that show it
+  protocol::ImageSize size;                ///< size of the frames
+  std::optional<OutputChain> chain;        ///< empty: the pixels of the window as they are
   std::vector<std::vector<float>> copies;  ///< by slot; empty where the rows lie in one piece
+
+  [[nodiscard]] std::size_t pixels() const noexcept {
+    return std::size_t{size.width_px} * size.height_px;
+  }
+  /// Returns whether the shift of a motion simulator moves it.
+  [[nodiscard]] bool shifts() const noexcept { return output.apply_shift; }
 };
 
 struct ChannelTable {
@@ -50,7 +62,8 @@ struct ChannelTable {
 /// that their images take. The sensor's size is the source's. A scenario without channels gets an
 /// injection channel per band.
 /// Errors (config): the scenario lacks the band of a channel, a window does not fit the image, or
-/// there are more bands, channels or images than fit.
+/// there are more bands, channels or images than fit. Errors of OutputChain::make() name the
+/// channel.
 [[nodiscard]] physics::Result<ChannelTable> make_channels(
     const std::optional<scene::ScenarioDesc>& scenario, const SourceInfo& source);
 
@@ -63,13 +76,24 @@ struct ChannelTable {
 [[nodiscard]] ChannelSet due_channels(const std::vector<Channel>& channels,
                                       std::uint64_t frame_number) noexcept;
 
-/// Returns the smallest window that holds those of some channels. RT-safe.
+/// Loads the files that the outputs of a scenario's channels name, for its sensor, and lets go of
+/// them. So a fault shows before a scene is warmed up. Errors: those of make_channels().
+[[nodiscard]] physics::Result<void> check_outputs(const scene::ScenarioDesc& scenario);
+
+/// Returns the smallest part of the image that some channels are made of. RT-safe.
 [[nodiscard]] scene::PixelRect window_around(const std::vector<Channel>& channels,
                                              ChannelSet of) noexcept;
 
-/// Returns the pixels of an image, row by row. They lie in the source's memory where they are in
-/// one piece there; else they are copied to the image's memory for `slot`. RT-safe.
-[[nodiscard]] std::span<const float> cut_out(Picture& picture, const renderer::FrameView& view,
-                                             renderer::SlotIndex slot) noexcept;
+/// The pixels of an image, row by row.
+struct TakenPicture {
+  std::span<const float> pixels;
+  std::uint32_t clamped_px = 0;  ///< by the drive table of its output
+};
+/// Returns the pixels of an image. They lie in the source's memory where they are in one piece
+/// there and nothing is done to them; else they are written to the image's memory for `slot`.
+/// `shift_px` moves the pictures that shift. RT-safe.
+[[nodiscard]] TakenPicture take_picture(Picture& picture, const renderer::FrameView& view,
+                                        renderer::SlotIndex slot,
+                                        const glm::vec2& shift_px) noexcept;
 
 }  // namespace emit::server

@@ -100,6 +100,8 @@ struct Context {
   Doorbells bells;
   std::vector<Channel> channels;  ///< fixed before the agents run
   std::vector<Picture> pictures;  ///< fixed likewise; the render agent fills their copies
+  /// Pictures shift: the motion agent hands measurements to the render agent too. Fixed likewise.
+  bool shifts_pictures = false;
   std::atomic<std::uint64_t> run_id{0};
   std::atomic<bool> device_lost{false};  ///< set by render: no frame comes any more
   /// Monotonic instant at which the render agent began to submit a frame after a jump of simulation
@@ -119,6 +121,7 @@ struct Context {
   SpscRing<MotionReport> motion_reports{256};   // motion -> conductor
   SpscRing<HostInput> gateway_inputs{32};       // gateway -> conductor
   SpscRing<GatewayReport> gateway_reports{64};  // conductor -> gateway
+  SpscRing<AxisFeedback> shift_feedback{1024};  // motion -> render, where pictures shift
   ByteRing journal;                             // conductor -> recorder
   SpscRing<ClientCommand> to_sender;            // receiver -> sender
   SpscRing<ClientReleased> from_sender;         // sender -> receiver

@@ -61,6 +61,7 @@ struct JournalFrame {
   bool rendered = false;
   std::uint64_t trigger_number = 0;
   std::int64_t slot_begin_ns = 0;
+  glm::vec2 shift_px{0.0F};
   std::uint32_t entity_count = 0;
 };
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <glm/ext/vector_float2.hpp>
 #include <span>
 
 #include "agents/frame_source.hpp"
@@ -10,6 +11,7 @@
 #include "emit/protocol/frame_header.hpp"
 #include "emit/protocol/host_frame.hpp"
 #include "motion/feedback_track.hpp"
+#include "motion/motion_table.hpp"
 #include "motion/seeker_course.hpp"
 #include "pacing/run_control.hpp"
 #include "rt/connection_key.hpp"
@@ -68,6 +70,9 @@ struct RenderJob {
   renderer::FrameRequest request;      ///< the render agent chooses its quality level
   std::int64_t deadline_ns = 0;        ///< when the pixels are due; 0: whenever
   ChannelSet channels = kAllChannels;  ///< channels that the frame is for
+  // Motion simulator: what the shift of the image follows from.
+  ShownAttitude attitude;
+  std::int64_t display_ns = 0;  ///< wall instant at which the frame is shown
   std::uint32_t weather_count = 0;
   std::array<scene::WeatherSample, kMaxWeatherPerFrame> weather;
   std::uint32_t entity_count = 0;
@@ -81,6 +86,9 @@ struct Image {
   ChannelSet channels = kAllChannels;  ///< channels that show it; others have no image
   std::array<std::span<const float>, kMaxPictures> pictures;
   std::array<std::uint32_t, kMaxPictures> crc32c{};
+  std::array<std::uint32_t, kMaxPictures> clamped_px{};  ///< by the drive tables of the outputs
+  /// Shift by which the pictures that shift were moved, right and down in the sensor's image.
+  glm::vec2 shift_px{0.0F};
 };
 
 /// Message of render agent to conductor, in order of submission.
@@ -94,6 +102,7 @@ struct RenderDone {
   std::uint8_t quality_level = 0;   ///< quality level, an index into the quality ladder
   float estimated_error_k = 0.0F;   ///< error of that level; NaN: not known
   bool device_failed = false;  ///< the driver reported an error: the pixels are not to be trusted
+  bool shift_known = true;     ///< false: no measurement of the axes is near, so nothing is moved
   std::int64_t render_start_ns = 0;
   std::int64_t render_end_ns = 0;
   std::int64_t readback_end_ns = 0;

@@ -115,7 +115,7 @@ physics::Result<void> AgentSet::make_sender() {
 
 physics::Result<void> AgentSet::make_motion() {
   if (!config_.motion.enabled()) {
-    return {};
+    return check_no_shift();
   }
   const auto named = [this](physics::Error& error) {
     return tl::unexpected<Error>(std::move(error).with_context(config_.file.string()));
@@ -133,6 +133,9 @@ physics::Result<void> AgentSet::make_motion() {
     return named(port.error());
   }
   motion_plan_ = std::move(*plan);
+  if (context_.shifts_pictures) {
+    render_->shift_by(*motion_plan_);
+  }
   motion_ = std::make_unique<MotionAgent>(context_, std::move(*port), std::move(*follower),
                                           motion_plan_->follower.period_ns);
   return {};
@@ -145,6 +148,19 @@ physics::Result<void> AgentSet::make_gateway() {
   }
   gateway_ = std::move(*made);
   return {};
+}
+
+physics::Result<void> AgentSet::check_no_shift() const {
+  const auto shifted = std::ranges::find_if(context_.channels, [](const Channel& channel) {
+    return (channel.output_steps & protocol::kOutputShifted) != 0;
+  });
+  if (shifted == context_.channels.end()) {
+    return {};
+  }
+  return physics::make_error(
+      ErrorCode::config,
+      fmt::format("{}: channel '{}' of the scenario has 'apply_shift', which needs [motion]",
+                  config_.file.string(), shifted->name));
 }
 
 void AgentSet::make_conductor(TriggerInput* triggers) {

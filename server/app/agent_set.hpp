@@ -56,8 +56,8 @@ class AgentSet {
   /// Makes the sender, and the shared memory where stream.shm asks for it. Errors: io.
   /// @pre start_render() succeeded
   [[nodiscard]] physics::Result<void> make_sender();
-  /// Makes the motion agent where the configuration has a motion simulator. Errors: config, io
-  /// (the controller's address).
+  /// Makes the motion agent where the configuration has a motion simulator. Errors: config (also
+  /// when pictures shift without one), io (the controller's address).
   /// @pre context.channels is filled
   [[nodiscard]] physics::Result<void> make_motion();
   /// Makes the gateway agent where the configuration has a host that needs one. Errors: config, io
@@ -101,6 +101,8 @@ class AgentSet {
   [[nodiscard]] const GatewayAgent* gateway() const noexcept { return gateway_.get(); }
 
  private:
+  /// Refuses channels whose pictures shift, where there is no motion simulator.
+  [[nodiscard]] physics::Result<void> check_no_shift() const;
   // A runner is null before it is made, and those of motion and gateway without one.
 
   /// Returns the runners that start after the render agent's, in the order of their start.

@@ -109,6 +109,11 @@ physics::Result<void> DaemonImpl::setup() {
       return tl::unexpected<Error>(std::move(free.error()).with_context("stream.shm"));
     }
   }
+  if (scenario_ && config_.source.kind == config::SourceKind::renderer) {
+    if (auto checked = check_outputs(*scenario_); !checked) {
+      return checked;
+    }
+  }
   if (auto started = agents_.start_render(source_factory()); !started) {
     return started;
   }
@@ -138,6 +143,8 @@ physics::Result<void> DaemonImpl::make_agents() {
   }
   context_.channels = std::move(channels->channels);
   context_.pictures = std::move(channels->pictures);
+  context_.shifts_pictures =
+      std::ranges::any_of(context_.pictures, [](const Picture& each) { return each.shifts(); });
   const ProcessNames names{build_text("emitd"), scenario_ ? scenario_->name : std::string(),
                            std::string(pacing_name(config_.pacing.mode)), source.device};
   agents_.receiver().set_identity({names.software, names.scenario, names.pacing, names.device});
@@ -185,6 +192,7 @@ void DaemonImpl::log_start(const ProcessNames& names) {
   const SourceInfo& source = agents_.source();
   log_.software(names, scenario_ ? scenario_->file : std::filesystem::path(), source);
   log_.scene(source.scene);
+  log_.outputs(context_.channels, context_.pictures);
   if (!privileges_.empty()) {
     log_.write(LogLevel::info, privileges_);
   }

@@ -75,6 +75,23 @@ void DaemonLog::scene(const renderer::SceneStats& scene) {
   }
 }
 
+void DaemonLog::outputs(const std::vector<Channel>& channels,
+                        const std::vector<Picture>& pictures) {
+  for (const Channel& channel : channels) {
+    const Picture& picture = pictures[channel.picture];
+    if (!picture.chain) {
+      continue;
+    }
+    write(LogLevel::info,
+          fmt::format("event=output channel=\"{}\" steps={:#04x} width_px={} height_px={}",
+                      channel.name, channel.output_steps, channel.width_px, channel.height_px));
+    if (const std::uint64_t outside_px = picture.chain->outside_px(); outside_px > 0) {
+      warn(fmt::format("event=output_outside channel=\"{}\" pixels={} of={} value_w_m2_sr={}",
+                       channel.name, outside_px, picture.pixels(), picture.output.outside_w_m2_sr));
+    }
+  }
+}
+
 void DaemonLog::shared_memory(const config::StreamConfig& stream) {
   write(LogLevel::info, fmt::format("event=shm url=shm://{} slots={} mode={:04o}", stream.shm,
                                     stream.shm_slots, stream.shm_mode));

@@ -47,6 +47,8 @@ class DaemonLog {
   /// Writes what happened to journals when the journal was opened.
   void journal(const Recorder::Opened& opened);
   void scene(const renderer::SceneStats& scene);
+  /// Writes what is done to the pictures of channels, with a warning for pixels that show nothing.
+  void outputs(const std::vector<Channel>& channels, const std::vector<Picture>& pictures);
   void shared_memory(const config::StreamConfig& stream);
   void congestion_control(const CongestionControl& tcp);
   /// Warns when the kernel's TAI offset was not set.

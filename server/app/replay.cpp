@@ -150,8 +150,9 @@ physics::Result<std::optional<ReplayedFrame>> JournalPlayer::play(const v1::Fram
                   fmt::format("the scenario has no channel {}", decision.radiance_channel()));
     }
     const Channel& channel = channels_.channels[decision.radiance_channel()];
-    view_crc_ = protocol::crc32c(
-        std::as_bytes(cut_out(channels_.pictures[channel.picture], *view_, *shown_)));
+    const glm::vec2 shift_px(decision.applied_shift_x_px(), decision.applied_shift_y_px());
+    view_crc_ = protocol::crc32c(std::as_bytes(
+        take_picture(channels_.pictures[channel.picture], *view_, *shown_, shift_px).pixels));
   } else if (view_ == nullptr) {
     return fail(ErrorCode::protocol, "repeats a frame, but none was rendered before");
   }

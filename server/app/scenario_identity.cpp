@@ -122,6 +122,13 @@ Result<std::vector<fs::path>> buffer_files(const fs::path& gltf) {
   return out;
 }
 
+/// Returns the paths of the files that the output of a channel names.
+std::vector<fs::path*> files_of(scene::ChannelOutput& output) {
+  std::vector<fs::path*> out{&output.distortion_file, &output.nuc_file, &output.drive_table_file};
+  std::erase_if(out, [](const fs::path* file) { return file->empty(); });
+  return out;
+}
+
 }  // namespace
 
 Result<ScenarioIdentity> identify_scenario(const scene::ScenarioDesc& scenario) {
@@ -135,6 +142,11 @@ Result<ScenarioIdentity> identify_scenario(const scene::ScenarioDesc& scenario) 
   plain.thermal.state_file.clear();  // holds what the rest makes, nothing of its own
   for (auto& object : plain.objects) {
     object.gltf = label_of(object.gltf, folder);
+  }
+  for (auto& channel : plain.channels) {
+    for (fs::path* file : files_of(channel.output)) {
+      *file = label_of(*file, folder);
+    }
   }
   identity.printed = config::print_scenario(plain);
   hash.update(std::as_bytes(std::span(identity.printed)));
@@ -151,6 +163,14 @@ Result<ScenarioIdentity> identify_scenario(const scene::ScenarioDesc& scenario) 
       if (auto done = hash_file(buffer, label_of(buffer, folder), hash, identity.files); !done) {
         return tl::unexpected<physics::Error>(
             std::move(done.error()).with_context(object.gltf.string()));
+      }
+    }
+  }
+  // A copy, because files_of() gives paths that may be changed.
+  for (scene::ChannelDesc channel : scenario.channels) {
+    for (const fs::path* file : files_of(channel.output)) {
+      if (auto done = hash_file(*file, label_of(*file, folder), hash, identity.files); !done) {
+        return tl::unexpected<physics::Error>(std::move(done.error()));
       }
     }
   }

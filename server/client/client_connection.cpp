@@ -51,6 +51,16 @@ std::optional<physics::Band> ChannelDescription::spectral_band() const {
   return out;
 }
 
+std::optional<protocol::ImagePoint> ChannelDescription::sensor_point(
+    const protocol::ImagePoint& frame_point) const noexcept {
+  if ((output_steps & protocol::kOutputDistorted) != 0) {
+    return std::nullopt;
+  }
+  const protocol::ImagePoint at =
+      protocol::window_point(output_steps, {window_width_px, window_height_px}, frame_point);
+  return protocol::ImagePoint{window_x_px + at.x_px, window_y_px + at.y_px};
+}
+
 ChannelDescription describe_channel(const v1::ChannelInfo& info) {
   ChannelDescription out{info.index(),      info.name(),     info.kind(),
                          info.sensor(),     info.band(),     info.band_lo_um(),
@@ -60,6 +70,9 @@ ChannelDescription describe_channel(const v1::ChannelInfo& info) {
   out.window_y_px = info.window_y_px();
   out.sensor_width_px = info.sensor_width_px();
   out.sensor_height_px = info.sensor_height_px();
+  out.window_width_px = info.window_width_px() > 0 ? info.window_width_px() : info.width_px();
+  out.window_height_px = info.window_height_px() > 0 ? info.window_height_px() : info.height_px();
+  out.output_steps = static_cast<std::uint8_t>(info.output_steps());
   if (info.band_is_rectangle()) {
     out.response.emplace();
   } else if (info.response_um_size() > 0 && info.response_um_size() == info.response_frac_size()) {

@@ -83,6 +83,12 @@ class MotionTable {
 /// Returns the angles of a motion.
 [[nodiscard]] TableAngles angles_of(const TableMotion& motion) noexcept;
 
+/// Attitudes of a frame: that of the seeker which it is for, and that in which it is rendered.
+struct ShownAttitude {
+  glm::dmat3 world_from_seeker{1.0};
+  glm::dmat3 world_from_rendered{1.0};
+};
+
 /// Shift of a finished image that turns it from the attitude in which it was rendered to the one in
 /// which it is shown.
 struct ImageShift {

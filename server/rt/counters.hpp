@@ -86,6 +86,9 @@ namespace emit::server {
   X(axes_reports, "measurements of the motion simulator taken")                            \
   X(axes_reports_refused, "its datagrams refused: malformed, old, wrong number of axes")   \
   X(axes_reports_dropped, "measurements the conductor did not take in time")               \
+  X(shift_feedback_dropped, "measurements the render agent did not take in time")          \
+  X(output_px_clamped, "pixels beyond the ends of a channel's drive table")                \
+  X(output_shifts_unknown, "frames not shifted: no measurement of the axes was near")      \
   X(axes_feedback_losses, "times its measurements stopped: motion.feedback_timeout_ms")    \
   X(axes_host_silences, "times no pose came for pacing.horizon_ms: its axes rest or park") \
   X(axes_interlocks, "times its interlock was open")                                       \

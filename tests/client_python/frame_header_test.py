@@ -3,7 +3,9 @@ import math
 import struct
 import unittest
 
-from emit_client import FLAG_NAMES, ProtocolError, parse_frame_header
+import numpy as np
+from emit_client import FLAG_NAMES, Channel, ProtocolError, parse_frame_header
+from emit_client.messages import control_pb2
 from wire import HEADER_DEFAULTS, crc32c_bit_by_bit, frame_header
 
 
@@ -21,7 +23,8 @@ class FrameHeaderBytes(unittest.TestCase):
                      previous_jitter_ns=23, slot_begin_ns=24, trigger_number=25, prediction_error_m=26.5,
                      prediction_error_rad=27.5, predictions=28, window_x_px=29, window_y_px=30, sensor_width_px=131,
                      sensor_height_px=132, motion_fault_bits=0b101001, shift_x_px=33.5, shift_y_px=-34.5,
-                     pointing_error_px=0.25, display_ns=35)
+                     pointing_error_px=0.25, display_ns=35, output_step_bits=0b10100110, applied_shift_x_px=36.5,
+                     applied_shift_y_px=-37.5)
         header = parse_frame_header(frame_header(
             **given, motion_state=5, position_east_m=1.5, position_north_m=2.5, position_up_m=3.5, attitude_w=0.5,
             attitude_x=-0.5, attitude_y=0.25, attitude_z=0.75))
@@ -30,18 +33,24 @@ class FrameHeaderBytes(unittest.TestCase):
             self.assertEqual(getattr(header, name), value, name)
         self.assertEqual(header.position_m, (1.5, 2.5, 3.5))
         self.assertEqual(header.world_from_body, (0.5, -0.5, 0.25, 0.75))
+        self.assertEqual(header.output_steps, {"mirrored_vertically", "rotated_90", "shifted", "driven"})
         self.assertEqual(header.motion_state, "following")
         self.assertEqual(header.motion_faults, {"no_feedback", "limit", "clock"})
         self.assertEqual(header.quantity, "radiance_w_m2_sr")
         self.assertEqual(header.payload_bytes, 48)
         self.assertEqual(header.encoding, "raw")
 
+    def test_drive_is_a_quantity_of_its_own(self):
+        self.assertEqual(parse_frame_header(frame_header(quantity=3)).quantity, "drive")
+
     def test_offsets_of_the_table(self):
         raw = bytearray(frame_header(width_px=3, height_px=4))
         for offset, layout, name, value in ((56, "<Q", "run_id", 77), (64, "<Q", "frame_number", 78),
                                             (72, "<Q", "host_frame_number", 79), (80, "<q", "sim_time_ns", -80),
                                             (160, "<Q", "previous_frame_number", 81), (224, "B", "quality_level", 3),
-                                            (240, "<q", "slot_begin_ns", 82), (264, "<I", "predictions", 83)):
+                                            (226, "B", "output_step_bits", 5), (228, "<f", "applied_shift_x_px", 1.5),
+                                            (240, "<q", "slot_begin_ns", 82), (312, "<f", "applied_shift_y_px", 2.5),
+                                            (264, "<I", "predictions", 83)):
             struct.pack_into(layout, raw, offset, value)
             self.assertEqual(getattr(parse_frame_header(with_crc(bytes(raw))), name), value, name)
 
@@ -61,9 +70,8 @@ class FrameHeaderBytes(unittest.TestCase):
 
     def test_reserved_bytes_are_ignored(self):
         raw = bytearray(frame_header())
-        raw[226:232] = b"\xff" * 6
+        raw[227] = 0xFF
         raw[290:292] = b"\xff" * 2
-        raw[312:316] = b"\xff" * 4
         self.assertEqual(parse_frame_header(with_crc(bytes(raw))).frame_number, 1)
 
     def test_faults_are_named(self):
@@ -74,13 +82,41 @@ class FrameHeaderBytes(unittest.TestCase):
                           (frame_header(header_bytes=319), "size field 319"),
                           (good[:100] + b"\x01" + good[101:], "CRC"),
                           (frame_header(pixel_format=2), "unknown pixel format 2"),
-                          (frame_header(quantity=3), "unknown pixel quantity 3"),
+                          (frame_header(quantity=4), "unknown pixel quantity 4"),
                           (frame_header(encoding=2), "unknown pixel encoding 2"),
                           (frame_header(payload_bytes=8), "8 payload bytes for 1x1"),
                           (frame_header(sensor_width_px=4, sensor_height_px=4, window_x_px=4), "of a sensor of 4x4")):
             with self.assertRaises(ProtocolError) as raised:
                 parse_frame_header(raw)
             self.assertIn(text, str(raised.exception))
+
+
+class ChannelGeometry(unittest.TestCase):
+    def test_a_place_of_a_turned_frame_is_found_in_the_sensors_image(self):
+        image = np.arange(12 * 10).reshape(10, 12)
+        for bits in range(16):
+            # numpy mirrors and rotates the window; its pixels are numbered, so that each one is found again.
+            window = image[3:7, 2:7]
+            if bits & 1:
+                window = np.fliplr(window)
+            if bits & 2:
+                window = np.flipud(window)
+            frame = np.rot90(window, -(bits >> 2))
+            channel = Channel.of(control_pb2.ChannelInfo(
+                width_px=frame.shape[1], height_px=frame.shape[0], window_x_px=2, window_y_px=3, window_width_px=5,
+                window_height_px=4, output_steps=bits))
+            for y in range(frame.shape[0]):
+                for x in range(frame.shape[1]):
+                    column, row = channel.sensor_point(x + 0.5, y + 0.5)
+                    self.assertEqual(image[int(row), int(column)], frame[y, x], (bits, x, y))
+                    self.assertEqual((column % 1, row % 1), (0.5, 0.5))
+
+    def test_only_the_map_knows_places_of_a_distorted_frame(self):
+        self.assertIsNone(Channel.of(control_pb2.ChannelInfo(width_px=5, output_steps=16)).sensor_point(1.0, 1.0))
+
+    def test_an_older_daemon_names_no_size_of_the_window(self):
+        channel = Channel.of(control_pb2.ChannelInfo(width_px=5, height_px=4, window_x_px=2, window_y_px=1))
+        self.assertEqual(channel.sensor_point(4.5, 0.5), (6.5, 1.5))
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 """Bytes as the wire format has them, made here a second time and in the plainest way."""
 import struct
 
-HEADER_LAYOUT = "<IBBBBHHIIffIfIIIQQQQqqqqqqqqqqQdddddddBB6xqqQffIIIIIIBBHfffqI"
+HEADER_LAYOUT = "<IBBBBHHIIffIfIIIQQQQqqqqqqqqqqQdddddddBBBBfqqQffIIIIIIBBHfffqf"
 
 
 def crc32c_bit_by_bit(data: bytes) -> int:
@@ -21,10 +21,10 @@ HEADER_DEFAULTS = dict(
     pose_sim_time_ns=0, host_received_ns=0, deadline_ns=0, render_start_ns=0, render_end_ns=0, readback_end_ns=0,
     send_start_ns=0, previous_age_ns=0, previous_delay_ns=0, previous_frame_number=0, position_east_m=0.0,
     position_north_m=0.0, position_up_m=0.0, attitude_w=1.0, attitude_x=0.0, attitude_y=0.0, attitude_z=0.0,
-    quality_level=0, encoding=0, previous_jitter_ns=0, slot_begin_ns=0, trigger_number=0, prediction_error_m=0.0,
+    quality_level=0, encoding=0, output_step_bits=0, reserved=0, applied_shift_x_px=0.0, previous_jitter_ns=0, slot_begin_ns=0, trigger_number=0, prediction_error_m=0.0,
     prediction_error_rad=0.0, predictions=0, window_x_px=0, window_y_px=0, sensor_width_px=0, sensor_height_px=0,
     encoded_bytes=0, motion_state=0, motion_fault_bits=0, reserved_motion=0, shift_x_px=0.0, shift_y_px=0.0,
-    pointing_error_px=0.0, display_ns=0, reserved=0)
+    pointing_error_px=0.0, display_ns=0, applied_shift_y_px=0.0)
 
 
 def frame_header(**fields) -> bytes:

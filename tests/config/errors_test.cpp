@@ -143,6 +143,25 @@ const std::vector<Case>& cases() {
        "s.toml:5:13: no channel shows every frame: the daemon's rate is that of its fastest "
        "channel, "
        "'every_nth' of one is 1"},
+      {"rotation_of_45_degrees", "[[channel]]\nname = \"a\"\nband = \"3-5\"\nrotate_deg = 45\n",
+       "s.toml:5:14: 'rotate_deg' is 45, must be one of: 0, 90, 180, 270"},
+      {"rotation_of_360_degrees", "[[channel]]\nname = \"a\"\nband = \"3-5\"\nrotate_deg = 360\n",
+       "s.toml:5:14: 'rotate_deg' is 360, must be 0 .. 270"},
+      {"unknown_mirror", "[[channel]]\nname = \"a\"\nband = \"3-5\"\nmirror = \"left\"\n",
+       "s.toml:5:10: 'mirror' is 'left', must be one of: none, horizontal, vertical, both"},
+      {"two_coefficients",
+       "[[channel]]\nname = \"a\"\nband = \"3-5\"\ndistortion_radial = [0.1, 0.2]\n",
+       "s.toml:5:21: 'distortion_radial' must be an array of 3 numbers, not of 2"},
+      {"map_and_polynomial",
+       "[[channel]]\nname = \"a\"\nband = \"3-5\"\ndistortion_file = \"m.exr\"\n"
+       "distortion_tangential = [0.1, 0.2]\n",
+       "s.toml:5:19: use only one of 'distortion_file' and the polynomial of "
+       "'distortion_radial' and 'distortion_tangential'"},
+      {"shift_of_an_injected_image",
+       "[[channel]]\nname = \"a\"\nband = \"3-5\"\napply_shift = true\n",
+       "s.toml:5:15: 'apply_shift' needs kind = \"projector\": an injected image has no shift"},
+      {"outside_of_nothing", "[[channel]]\nname = \"a\"\nband = \"3-5\"\noutside_w_m2_sr = 2.0\n",
+       "s.toml:5:19: 'outside_w_m2_sr' has no effect without a distortion or 'apply_shift'"},
       {"channel_twice",
        "[[channel]]\nname = \"a\"\nband = \"3-5\"\n[[channel]]\nname = \"a\"\nband = \"8-12\"\n",
        "s.toml:6:8: channel 'a' is defined twice"},
@@ -299,6 +318,14 @@ TEST_F(ConfigTest, a_missing_gltf_is_reported_where_it_is_named) {
   options_.require_scene_files = true;
   EXPECT_EQ(scenario_error("[[object]]\ngltf = \"none.glb\"\n"),
             "s.toml:3:8: 'gltf': none.glb: no such file");
+}
+
+TEST_F(ConfigTest, a_missing_file_of_an_output_is_reported_where_it_is_named) {
+  const std::string channel =
+      "[[channel]]\nname = \"a\"\nband = \"8-12\"\ndrive_table_file = \"none.csv\"\n";
+  EXPECT_EQ(scenario_error(channel), "(loaded)");
+  options_.require_scene_files = true;
+  EXPECT_EQ(scenario_error(channel), "s.toml:5:20: 'drive_table_file': none.csv: no such file");
 }
 
 TEST_F(ConfigTest, a_fault_in_a_library_names_the_library) {

@@ -95,6 +95,22 @@ kind = "injection"
 band = "7.7-9.3"
 window_px = [8, 16, 48, 32]
 every_nth = 4
+[[channel]]
+name = "array"
+kind = "projector"
+band = "det"
+mirror = "both"
+rotate_deg = 270
+distortion_file = "map.exr"
+outside_w_m2_sr = 1.5
+apply_shift = true
+nuc_file = "nuc.exr"
+drive_table_file = "drive.csv"
+[[channel]]
+name = "barrel"
+band = "det"
+distortion_radial = [0.125, -0.25, 0.5]
+distortion_tangential = [0.0625, -0.03125]
 
 [[object]]
 name = "ground"
@@ -205,13 +221,24 @@ TEST_F(ConfigTest, every_scenario_key_reaches_its_field) {
   EXPECT_EQ(s.bands[0].response.size(), 3U);
   EXPECT_EQ(s.bands[1].name, "7.7-9.3");
   EXPECT_EQ(s.bands[1].lo_um, 7.7);
-  ASSERT_EQ(s.channels.size(), 2U);
+  ASSERT_EQ(s.channels.size(), 4U);
   EXPECT_EQ(s.channels[0].kind, scene::ChannelKind::projector);
   EXPECT_EQ(s.channels[0].band, "det");
   EXPECT_TRUE(s.channels[0].window_px.empty());
   EXPECT_EQ(s.channels[0].every_nth, 1U);
   EXPECT_EQ(s.channels[1].window_px, (scene::PixelRect{8, 16, 48, 32}));
   EXPECT_EQ(s.channels[1].every_nth, 4U);
+  EXPECT_EQ(s.channels[0].output, scene::ChannelOutput{});
+  const scene::ChannelOutput& output = s.channels[2].output;
+  EXPECT_EQ(output.mirror, scene::PictureMirror::both);
+  EXPECT_EQ(output.rotate_deg, 270U);
+  EXPECT_EQ(output.distortion_file, folder_ / "map.exr");
+  EXPECT_EQ(output.outside_w_m2_sr, 1.5);
+  EXPECT_TRUE(output.apply_shift);
+  EXPECT_EQ(output.nuc_file, folder_ / "nuc.exr");
+  EXPECT_EQ(output.drive_table_file, folder_ / "drive.csv");
+  EXPECT_EQ(s.channels[3].output.distortion_radial, (std::array{0.125, -0.25, 0.5}));
+  EXPECT_EQ(s.channels[3].output.distortion_tangential, (std::array{0.0625, -0.03125}));
   ASSERT_EQ(s.objects.size(), 3U);
   EXPECT_EQ(s.objects[0].gltf, folder_ / "ground.glb");
   EXPECT_EQ(s.objects[0].material, "concrete");

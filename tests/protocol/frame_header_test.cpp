@@ -170,5 +170,26 @@ TEST(FrameHeader, IgnoresReservedBytesAndWhatFollows) {
   EXPECT_EQ(error_of(bytes), "decoded");
 }
 
+/// Every field of the output chain at the offset that docs/wire.md states.
+TEST(FrameHeader, SaysWhatWasDoneToThePixels) {
+  FrameHeader header = golden_header();
+  header.quantity = PixelQuantity::drive;
+  header.output_steps = kOutputMirroredVertically | kOutputRotated90 | kOutputShifted;
+  header.applied_shift_x_px = 1.5F;
+  header.applied_shift_y_px = -0.25F;
+  header.window_x_px = header.window_y_px = header.sensor_width_px = header.sensor_height_px = 0;
+  const auto bytes = encoded(header);
+  EXPECT_EQ(to_hex(std::span(bytes).subspan(6, 1)), "03");
+  EXPECT_EQ(to_hex(std::span(bytes).subspan(226, 6)), "26000000c03f");
+  EXPECT_EQ(to_hex(std::span(bytes).subspan(312, 4)), "000080be");
+  const auto back = decode_frame_header(bytes);
+  ASSERT_TRUE(back) << back.error().text;
+  EXPECT_EQ(back->quantity, PixelQuantity::drive);
+  EXPECT_EQ(back->output_steps, header.output_steps);
+  EXPECT_EQ(back->applied_shift_x_px, 1.5F);
+  EXPECT_EQ(back->applied_shift_y_px, -0.25F);
+  EXPECT_THAT(error_of(forged(6, 4)), HasSubstr("pixel quantity 4"));
+}
+
 }  // namespace
 }  // namespace emit::protocol

@@ -45,8 +45,9 @@ inline server::ChannelTable table_of(const scene::ScenarioDesc& scenario, std::u
 /// Sender with TCP clients over socket pairs; the test publishes.
 class ChannelClients {
  public:
-  ChannelClients() : context_(clock_, 1u << 16, 8), sender_(context_, 4, 8, true) {
-    auto table = table_of(seeker_channels());
+  explicit ChannelClients(const scene::ScenarioDesc& scenario = seeker_channels())
+      : context_(clock_, 1u << 16, 8), sender_(context_, 4, 8, true) {
+    auto table = table_of(scenario);
     context_.channels = std::move(table.channels);
     context_.pictures = std::move(table.pictures);
     EXPECT_TRUE(sender_.on_start());
@@ -62,6 +63,7 @@ class ChannelClients {
     std::vector<std::uint64_t> gaps;     ///< numbers of frames with kFlagGapBefore
     std::vector<std::uint64_t> encoded;  ///< numbers of frames that came so
     std::vector<std::byte> pixels;       ///< of the newest, decoded
+    protocol::FrameHeader header;        ///< likewise
   };
   Peer& connect(std::size_t channel, std::uint32_t every_nth = 1, bool compression = false) {
     Peer& peer = *peers_.emplace_back(std::make_unique<Peer>());
@@ -88,15 +90,13 @@ class ChannelClients {
   }
   /// Publishes a frame. `channels` have pixels in it. With `repeat` the previous image is shown
   /// again, as far as it has their pixels.
-  void publish(server::ChannelSet channels, bool repeat = false) {
-    server::PublishFrame frame;
+  void publish(server::ChannelSet channels, bool repeat = false, server::PublishFrame frame = {}) {
     frame.repeat = repeat;
     frame.image.source = &source_;
     frame.image.channels = channels;
     for (std::size_t i = 0; i < context_.pictures.size(); ++i) {
-      const auto& window = context_.pictures[i].window_px;
       frame.image.pictures[i] =
-          std::span<const float>(pixels_).first(std::size_t{window.width_px} * window.height_px);
+          std::span<const float>(pixels_).first(context_.pictures[i].pixels());
       frame.image.crc32c[i] = protocol::crc32c(std::as_bytes(frame.image.pictures[i]));
     }
     frame.header.frame_number = ++number_;
@@ -133,6 +133,7 @@ class ChannelClients {
           const auto view = protocol::decode_frame_record(record.body);
           ASSERT_TRUE(view.has_value()) << view.error().text;
           peer->numbers.push_back(view->header.frame_number);
+          peer->header = view->header;
           peer->pixels.assign(view->pixels.begin(), view->pixels.end());
           if (view->header.encoding != protocol::PixelEncoding::raw) {
             peer->encoded.push_back(view->header.frame_number);

@@ -143,6 +143,7 @@ class ConductorRig {
   std::uint64_t count(server::Counter id) { return context_.counters.get(id); }
   server::Context& context() { return context_; }
   server::Conductor& conductor() { return conductor_; }
+  server::RenderAgent& render() { return render_; }
 
   FakeClock clock;
   SourceScript script;

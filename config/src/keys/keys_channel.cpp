@@ -10,6 +10,7 @@ namespace emit::config {
 
 using scene::ChannelDesc;
 using scene::ChannelKind;
+using scene::PictureMirror;
 
 namespace {
 
@@ -30,38 +31,130 @@ void read_window(ChannelDesc& out, const Node& node, Diagnostics& diagnostics) {
   }
 }
 
+/// Key of coefficients, written only where one is not 0.
+template <std::size_t count, class Field>
+Key<ChannelDesc> coefficients(std::string name, std::string range, Field field,
+                              std::string meaning) {
+  return custom<ChannelDesc>(
+      {name, fmt::format("array of {} floats", count), "", std::move(range), std::move(meaning),
+       false},
+      [name, field](ChannelDesc& out, const Node& node, Diagnostics& diagnostics) {
+        read_vector(node, name, count, field(out).data(), diagnostics);
+      },
+      [field](const ChannelDesc& in) -> std::optional<std::string> {
+        if (field(in) == std::array<double, count>{}) {
+          return std::nullopt;
+        }
+        return toml_vector(field(in).data(), count);
+      });
+}
+
+void read_rotation(ChannelDesc& out, const Node& node, Diagnostics& diagnostics) {
+  std::int64_t angle_deg = 0;
+  const std::size_t faults = diagnostics.size();
+  read_integer(node, "rotate_deg", 0, 270, angle_deg, diagnostics);
+  if (diagnostics.size() != faults) {
+    return;
+  }
+  if (angle_deg % 90 != 0) {
+    diagnostics.add(node.at,
+                    fmt::format("'rotate_deg' is {}, must be one of: 0, 90, 180, 270", angle_deg));
+    return;
+  }
+  out.output.rotate_deg = static_cast<std::uint32_t>(angle_deg);
+}
+
+/// Adds the keys of what is done to a picture.
+void add_output_keys(KeyTable<ChannelDesc>& keys) {
+  keys.push_back(written_if<ChannelDesc>(
+      [](const ChannelDesc& in) { return in.output.mirror != PictureMirror::none; },
+      choice<ChannelDesc>("mirror",
+                          std::vector<std::pair<std::string, PictureMirror>>{
+                              {"none", PictureMirror::none},
+                              {"horizontal", PictureMirror::horizontal},
+                              {"vertical", PictureMirror::vertical},
+                              {"both", PictureMirror::both}},
+                          EMIT_FIELD(output.mirror),
+                          "Reverses the columns (horizontal), the rows (vertical) or both of the "
+                          "window's picture.")));
+  keys.push_back(custom<ChannelDesc>(
+      {"rotate_deg", "integer", "deg", "0, 90, 180, 270",
+       "Clockwise rotation of the picture, after the mirror. 90 and 270 exchange width and height.",
+       false},
+      read_rotation, [](const ChannelDesc& in) -> std::optional<std::string> {
+        if (in.output.rotate_deg == 0) {
+          return std::nullopt;
+        }
+        return std::to_string(in.output.rotate_deg);
+      }));
+  keys.push_back(path<ChannelDesc>("distortion_file", EMIT_FIELD(output.distortion_file),
+                                   "EXR map with channels `x` and `y`: the place in the turned "
+                                   "picture that each pixel shows, px "
+                                   "from the top left corner."));
+  keys.push_back(coefficients<3>(
+      "distortion_radial", "finite", EMIT_FIELD(output.distortion_radial),
+      "In place of a map: k1, k2, k3 of Brown's polynomial about the picture's centre."));
+  keys.push_back(coefficients<2>("distortion_tangential", "finite",
+                                 EMIT_FIELD(output.distortion_tangential),
+                                 "p1, p2 of the same polynomial."));
+  keys.push_back(written_if<ChannelDesc>(
+      [](const ChannelDesc& in) { return in.output.outside_w_m2_sr != 0.0; },
+      number<ChannelDesc>("outside_w_m2_sr", "W m-2 sr-1", between(0.0, 1e9),
+                          EMIT_FIELD(output.outside_w_m2_sr),
+                          "Radiance of pixels that show nothing of the picture. Without it 0.")));
+  keys.push_back(written_if<ChannelDesc>(
+      [](const ChannelDesc& in) { return in.output.apply_shift; },
+      boolean<ChannelDesc>("apply_shift", EMIT_FIELD(output.apply_shift),
+                           "emitd moves the picture by the shift of the motion simulator, so that "
+                           "the projector need not. Needs `[motion]`; projector channels only.")));
+  keys.push_back(path<ChannelDesc>(
+      "nuc_file", EMIT_FIELD(output.nuc_file),
+      "EXR with channels `gain` and `offset` (W m-2 sr-1) of the frame's size: each pixel becomes "
+      "gain L + offset."));
+  keys.push_back(path<ChannelDesc>(
+      "drive_table_file", EMIT_FIELD(output.drive_table_file),
+      "CSV file `radiance_w_m2_sr,drive`: frames hold drive, linear between the points, in place "
+      "of radiance."));
+}
+
 }  // namespace
 
 const KeyTable<ChannelDesc>& channel_keys() {
-  static const KeyTable<ChannelDesc> keys = {
-      required(text<ChannelDesc>("name", EMIT_FIELD(name), "Name that a client subscribes to.")),
-      choice<ChannelDesc>(
-          "kind",
-          std::vector<std::pair<std::string, ChannelKind>>{{"injection", ChannelKind::injection},
-                                                           {"projector", ChannelKind::projector}},
-          EMIT_FIELD(kind), "Device that the channel feeds."),
-      required(text<ChannelDesc>("band", EMIT_FIELD(band),
-                                 "Spectral band: `3-5`, `3.4-4.1`, `8-12`, `7.7-9.3` (um, perfect "
-                                 "rectangles) or one of `[[band]]`.")),
-      custom<ChannelDesc>({"window_px", "array of 4 integers", "px", "within the sensor's image",
-                           "Window of the sensor's image: `[x, y, width, height]` from the top "
-                           "left. Frames hold only these pixels. Without it they hold all.",
-                           false},
-                          read_window,
-                          [](const ChannelDesc& in) -> std::optional<std::string> {
-                            if (in.window_px.empty()) {
-                              return std::nullopt;
-                            }
-                            return fmt::format("[{}, {}, {}, {}]", in.window_px.x_px,
-                                               in.window_px.y_px, in.window_px.width_px,
-                                               in.window_px.height_px);
-                          }),
-      written_if<ChannelDesc>(
-          [](const ChannelDesc& in) { return in.every_nth != 1; },
-          integer<ChannelDesc>("every_nth", "", 1, limits::kMaxEveryNth, EMIT_FIELD(every_nth),
-                               "The channel shows frames 1, 1 + n, 1 + 2 n and so on of every run. "
-                               "At least one channel shows all.")),
-  };
+  static const KeyTable<ChannelDesc> keys = [] {
+    KeyTable<ChannelDesc> all = {
+        required(text<ChannelDesc>("name", EMIT_FIELD(name), "Name that a client subscribes to.")),
+        choice<ChannelDesc>(
+            "kind",
+            std::vector<std::pair<std::string, ChannelKind>>{{"injection", ChannelKind::injection},
+                                                             {"projector", ChannelKind::projector}},
+            EMIT_FIELD(kind), "Device that the channel feeds."),
+        required(
+            text<ChannelDesc>("band", EMIT_FIELD(band),
+                              "Spectral band: `3-5`, `3.4-4.1`, `8-12`, `7.7-9.3` (um, perfect "
+                              "rectangles) or one of `[[band]]`.")),
+        custom<ChannelDesc>({"window_px", "array of 4 integers", "px", "within the sensor's image",
+                             "Window of the sensor's image: `[x, y, width, height]` from the top "
+                             "left. Frames hold only these pixels. Without it they hold all.",
+                             false},
+                            read_window,
+                            [](const ChannelDesc& in) -> std::optional<std::string> {
+                              if (in.window_px.empty()) {
+                                return std::nullopt;
+                              }
+                              return fmt::format("[{}, {}, {}, {}]", in.window_px.x_px,
+                                                 in.window_px.y_px, in.window_px.width_px,
+                                                 in.window_px.height_px);
+                            }),
+        written_if<ChannelDesc>(
+            [](const ChannelDesc& in) { return in.every_nth != 1; },
+            integer<ChannelDesc>(
+                "every_nth", "", 1, limits::kMaxEveryNth, EMIT_FIELD(every_nth),
+                "The channel shows frames 1, 1 + n, 1 + 2 n and so on of every run. "
+                "At least one channel shows all.")),
+    };
+    add_output_keys(all);
+    return all;
+  }();
   return keys;
 }
 

@@ -28,9 +28,10 @@ namespace emit::config {
                                                                       Diagnostics& diagnostics);
 [[nodiscard]] std::vector<scene::ChannelDesc> resolve_channels(
     const Node& root, const std::vector<std::string>& known_bands, Diagnostics& diagnostics);
-/// Checks that windows lie within the sensor's image and that one channel shows every frame.
-void check_channel_windows(const Node& root, const scene::ScenarioDesc& scenario,
-                           Diagnostics& diagnostics);
+/// Checks that windows lie within the sensor's image, that outputs make sense and, where
+/// `require_files` asks for it, that their files exist, and that one channel shows every frame.
+void check_channels(const Node& root, const scene::ScenarioDesc& scenario, bool require_files,
+                    Diagnostics& diagnostics);
 /// The bands that channels use, in the order of channels.
 [[nodiscard]] std::vector<scene::SpectralBand> bands_in_use(
     const std::vector<scene::ChannelDesc>& channels,

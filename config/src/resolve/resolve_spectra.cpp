@@ -197,8 +197,42 @@ std::vector<ChannelDesc> resolve_channels(const Node& root,
   return channels;
 }
 
-void check_channel_windows(const Node& root, const scene::ScenarioDesc& scenario,
-                           Diagnostics& diagnostics) {
+namespace {
+
+/// Reports settings of an output that make no sense together, and files that do not exist.
+void check_output(const Node& table, const ChannelDesc& channel, bool require_files,
+                  Diagnostics& diagnostics) {
+  const scene::ChannelOutput& output = channel.output;
+  if (!output.distortion_file.empty() && output.has_polynomial()) {
+    diagnostics.add(key_location(table, "distortion_file"),
+                    "use only one of 'distortion_file' and the polynomial of 'distortion_radial' "
+                    "and 'distortion_tangential'");
+  }
+  if (output.apply_shift && channel.kind != scene::ChannelKind::projector) {
+    diagnostics.add(key_location(table, "apply_shift"),
+                    "'apply_shift' needs kind = \"projector\": an injected image has no shift");
+  }
+  const bool resamples =
+      !output.distortion_file.empty() || output.has_polynomial() || output.apply_shift;
+  if (output.outside_w_m2_sr != 0.0 && !resamples) {
+    diagnostics.add(key_location(table, "outside_w_m2_sr"),
+                    "'outside_w_m2_sr' has no effect without a distortion or 'apply_shift'");
+  }
+  for (const auto& [key, file] : {std::pair{"distortion_file", &output.distortion_file},
+                                  std::pair{"nuc_file", &output.nuc_file},
+                                  std::pair{"drive_table_file", &output.drive_table_file}}) {
+    std::error_code code;
+    if (require_files && !file->empty() && !std::filesystem::is_regular_file(*file, code)) {
+      diagnostics.add(key_location(table, key),
+                      fmt::format("'{}': {}: no such file", key, file->string()));
+    }
+  }
+}
+
+}  // namespace
+
+void check_channels(const Node& root, const scene::ScenarioDesc& scenario, bool require_files,
+                    Diagnostics& diagnostics) {
   const Node* section = root.find("channel");
   if (section == nullptr || section->items.size() != scenario.channels.size()) {
     return;
@@ -215,6 +249,7 @@ void check_channel_windows(const Node& root, const scene::ScenarioDesc& scenario
                                   window.x_px + window.width_px, window.y_px + window.height_px,
                                   width_px, height_px));
     }
+    check_output(section->items[i], scenario.channels[i], require_files, diagnostics);
     all_frames = all_frames || scenario.channels[i].every_nth == 1;
   }
   if (!all_frames && !section->items.empty()) {

@@ -259,7 +259,7 @@ bool Conductor::publish_image(const RenderDone& done, std::int64_t now_ns) noexc
   const bool has_deadline = !slots_ || slots_->has_deadlines();
   FrameLedger::Issued& issued = ledger_.oldest();
   if (motion_) {
-    motion_->finish(issued);
+    motion_->finish(issued, done);
   }
   ledger_.fill_image(*frame, done,
                      late_for_slot || (has_deadline && is_past_deadline(issued.header.deadline_ns,

@@ -50,6 +50,7 @@ void ConductorJournal::frame(const protocol::FrameHeader& header, const Shown& s
   line.rendered = rendered;
   line.trigger_number = header.trigger_number;
   line.slot_begin_ns = header.slot_begin_ns;
+  line.shift_px = shown.shift_px;
   line.entity_count = static_cast<std::uint32_t>(entities.size());
   written(writer_.write(line, entities));
 }

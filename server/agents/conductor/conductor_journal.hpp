@@ -25,6 +25,7 @@ class ConductorJournal {
     std::int64_t thermal_time_ns = 0;
     std::uint32_t crc32c = 0;   ///< of the pixels of `channel`
     std::uint32_t channel = 0;  ///< index of the first channel that shows the image
+    glm::vec2 shift_px{0.0F};   ///< shift of the pictures that shift
   };
   /// @param rendered  false: the previous frame is repeated
   void frame(const protocol::FrameHeader& header, const Shown& shown, bool rendered,

@@ -69,6 +69,7 @@ void FrameLedger::fill_image(PublishFrame& out, const RenderDone& done, bool lat
   note_quality(header, issued, done);
   shown_ = header;
   shown_for_journal_.thermal_time_ns = issued.thermal_time_ns;
+  shown_for_journal_.shift_px = done.image.shift_px;
   for (const Channel& channel : context_.channels) {
     if ((done.image.channels >> channel.index & 1U) != 0) {
       shown_for_journal_.channel = channel.index;

@@ -3,7 +3,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <glm/ext/matrix_double3x3.hpp>
 #include <span>
 #include <vector>
 
@@ -24,8 +23,7 @@ class FrameLedger {
     bool entities_behind = false;  ///< more entities moved than a frame takes
     /// Attitudes of a frame with a motion simulator, and what was wrong when it was issued.
     struct Motion {
-      glm::dmat3 world_from_seeker{1.0};
-      glm::dmat3 world_from_rendered{1.0};
+      ShownAttitude attitude;
       std::uint8_t faults = 0;  ///< protocol::MotionFaults
     };
     Motion motion;

@@ -115,67 +115,72 @@ TableAngles MotionView::angles_at(std::int64_t time_ns, bool& known) const noexc
   return latest != nullptr ? latest->angles : TableAngles{};
 }
 
-glm::dvec2 MotionView::shift_px(const FrameLedger::Issued::Motion& motion,
-                                const TableAngles& angles) const noexcept {
-  const glm::dmat3 world_from_shown =
-      plan_.follower.table.world_from_projector(motion.world_from_seeker, angles);
-  // Axes so far from where they were expected are no matter of a shift.
-  constexpr double kLeastCosine = 0.9;
-  if (glm::dot(motion.world_from_rendered[0], world_from_shown[0]) < kLeastCosine ||
-      glm::dot(motion.world_from_rendered[1], world_from_shown[1]) < kLeastCosine) {
-    return glm::dvec2(std::numeric_limits<double>::quiet_NaN());
-  }
-  return image_shift(motion.world_from_rendered, world_from_shown, plan_.size_px, plan_.focal_px)
-      .shift_px;
+glm::dvec2 MotionView::shift_px(const ShownAttitude& attitude,
+                                std::int64_t display_ns) const noexcept {
+  bool known = true;
+  const TableAngles angles = angles_at(display_ns, known);
+  return known ? image_shift_px(plan_, attitude, angles)
+               : glm::dvec2(std::numeric_limits<double>::quiet_NaN());
 }
 
 void MotionView::place(RenderJob& job, FrameLedger::Issued& issued,
                        std::int64_t display_ns) noexcept {
   take_reports();
   bool known = true;
-  issued.motion.world_from_seeker = glm::mat3_cast(job.request.sensor_pose.world_from_body);
-  issued.motion.world_from_rendered = issued.motion.world_from_seeker;
+  ShownAttitude& attitude = issued.motion.attitude;
+  attitude.world_from_seeker = glm::mat3_cast(job.request.sensor_pose.world_from_body);
+  attitude.world_from_rendered = attitude.world_from_seeker;
   if (plan_.projects) {
     issued.header.display_ns = display_ns;
-    issued.motion.world_from_rendered = plan_.follower.table.world_from_projector(
-        issued.motion.world_from_seeker, angles_at(display_ns, known));
+    attitude.world_from_rendered = plan_.follower.table.world_from_projector(
+        attitude.world_from_seeker, angles_at(display_ns, known));
     job.request.sensor_pose.world_from_body =
-        glm::normalize(glm::quat_cast(issued.motion.world_from_rendered));
+        glm::normalize(glm::quat_cast(attitude.world_from_rendered));
   }
+  job.attitude = attitude;
+  job.display_ns = display_ns;
   issued.motion.faults = faults_;
   if (!known) issued.motion.faults |= protocol::kMotionNoFeedback;
 }
 
-void MotionView::finish(FrameLedger::Issued& issued) noexcept {
+void MotionView::finish(FrameLedger::Issued& issued, const RenderDone& done) noexcept {
   take_reports();
   finished_ = issued.motion;
-  write(issued.header, finished_, issued.header.display_ns);
+  applied_px_ = done.image.shift_px;
+  glm::dvec2 shift(std::numeric_limits<double>::quiet_NaN());
+  if (!context_.shifts_pictures) {
+    shift = shift_px(finished_.attitude, issued.header.display_ns);
+  } else if (done.shift_known) {
+    shift = done.image.shift_px;
+  }
+  write(issued.header, finished_, shift);
 }
 
 void MotionView::finish_repeat(FrameHeader& header, std::int64_t display_ns) noexcept {
   take_reports();
   if (plan_.projects) header.display_ns = display_ns;
-  write(header, finished_, display_ns);
+  write(header, finished_, shift_px(finished_.attitude, display_ns));
 }
 
 void MotionView::write(FrameHeader& header, const FrameLedger::Issued::Motion& motion,
-                       std::int64_t display_ns) noexcept {
+                       const glm::dvec2& shift_px) noexcept {
   header.motion_state = state_;
   header.motion_faults = static_cast<std::uint8_t>(motion.faults | faults_);
   header.shift_x_px = 0.0F;
   header.shift_y_px = 0.0F;
   header.pointing_error_px = std::numeric_limits<float>::quiet_NaN();
   if (plan_.projects) {
-    bool known = true;
-    const glm::dvec2 shift = shift_px(motion, angles_at(display_ns, known));
-    if (!known || !std::isfinite(shift.x + shift.y)) {
-      header.motion_faults |= protocol::kMotionNoFeedback;
+    // Nothing remains to be done beside what was applied, where the axes are not known.
+    glm::vec2 wanted_px = applied_px_;
+    if (std::isfinite(shift_px.x + shift_px.y)) {
+      wanted_px = shift_px;
     } else {
-      header.shift_x_px = static_cast<float>(shift.x);
-      header.shift_y_px = static_cast<float>(shift.y);
+      header.motion_faults |= protocol::kMotionNoFeedback;
     }
+    header.shift_x_px = wanted_px.x;
+    header.shift_y_px = wanted_px.y;
     if (pointing_error_px_) header.pointing_error_px = static_cast<float>(*pointing_error_px_);
-    keep(header, motion, shift);
+    keep(header, motion, shift_px);
   }
   header.flags &= ~std::uint32_t{protocol::kFlagMotionFault};
   if (!follows(header)) header.flags |= protocol::kFlagMotionFault;
@@ -201,7 +206,8 @@ void MotionView::judge_shown() noexcept {
     bool known = true;
     const TableAngles angles = angles_at(shown.display_ns, known);
     if (known) {
-      pointing_error_px_ = glm::distance(shift_px(shown.motion, angles), shown.shift_px);
+      pointing_error_px_ =
+          glm::distance(image_shift_px(plan_, shown.motion.attitude, angles), shown.shift_px);
       context_.motion_times.pointing.record(*pointing_error_px_);
     }
     first_shown_ = (first_shown_ + 1) % kKept;

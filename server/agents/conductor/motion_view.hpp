@@ -9,6 +9,7 @@
 #include "agents/context.hpp"
 #include "motion/feedback_track.hpp"
 #include "motion/motion_plan.hpp"
+#include "motion/shift_finder.hpp"
 #include "pacing/scenario_track.hpp"
 
 namespace emit::server {
@@ -37,8 +38,9 @@ class MotionView {
 
   /// Turns the camera of a frame that is shown at `display_ns`, wall.
   void place(RenderJob& job, FrameLedger::Issued& issued, std::int64_t display_ns) noexcept;
-  /// Writes state and shift into the header of a finished frame.
-  void finish(FrameLedger::Issued& issued) noexcept;
+  /// Writes state and shift into the header of a finished frame. Where pictures shift, it is the
+  /// shift that they were moved by.
+  void finish(FrameLedger::Issued& issued, const RenderDone& done) noexcept;
   /// Writes state and shift into the header of the frame that finish() had last, which is shown
   /// again at `display_ns`.
   void finish_repeat(protocol::FrameHeader& header, std::int64_t display_ns) noexcept;
@@ -54,10 +56,12 @@ class MotionView {
 
   /// Returns the angles at an instant. `known` is false where no measurement is near.
   [[nodiscard]] TableAngles angles_at(std::int64_t time_ns, bool& known) const noexcept;
-  [[nodiscard]] glm::dvec2 shift_px(const FrameLedger::Issued::Motion& motion,
-                                    const TableAngles& angles) const noexcept;
+  /// Returns the shift that brings the image to where the axes are at `display_ns`. It is not a
+  /// number where that is not known.
+  [[nodiscard]] glm::dvec2 shift_px(const ShownAttitude& attitude,
+                                    std::int64_t display_ns) const noexcept;
   void write(protocol::FrameHeader& header, const FrameLedger::Issued::Motion& motion,
-             std::int64_t display_ns) noexcept;
+             const glm::dvec2& shift_px) noexcept;
   /// Keeps a frame until its axes are measured.
   void keep(const protocol::FrameHeader& header, const FrameLedger::Issued::Motion& motion,
             const glm::dvec2& shift) noexcept;
@@ -77,6 +81,7 @@ class MotionView {
   /// Kind of the message that the motion agent had no room for; pose: there is none.
   MotionInput::Kind pending_ = MotionInput::Kind::pose;
   FrameLedger::Issued::Motion finished_;  ///< of the newest finished frame
+  glm::vec2 applied_px_{0.0F};            ///< shift by which its pictures were moved
   std::array<Shown, kKept> shown_;
   std::size_t first_shown_ = 0;
   std::size_t shown_count_ = 0;

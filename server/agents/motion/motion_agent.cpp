@@ -112,6 +112,9 @@ void MotionAgent::note_status() noexcept {
 }
 
 void MotionAgent::report(const AxisFeedback* feedback) noexcept {
+  if (feedback != nullptr && context_.shifts_pictures && !context_.shift_feedback.push(*feedback)) {
+    context_.counters.add(Counter::shift_feedback_dropped);
+  }
   MotionReport* out = context_.motion_reports.claim();
   if (out == nullptr) {
     context_.counters.add(Counter::axes_reports_dropped);

@@ -21,8 +21,11 @@ void fill(const Channel& channel, v1::ChannelInfo& out) {
   out.set_width_px(channel.width_px);
   out.set_height_px(channel.height_px);
   out.set_every_nth(channel.every_nth);
-  out.set_window_x_px(channel.window_x_px);
-  out.set_window_y_px(channel.window_y_px);
+  out.set_window_x_px(channel.window_px.x_px);
+  out.set_window_y_px(channel.window_px.y_px);
+  out.set_window_width_px(channel.window_px.width_px);
+  out.set_window_height_px(channel.window_px.height_px);
+  out.set_output_steps(channel.output_steps);
   out.set_sensor_width_px(channel.sensor_width_px);
   out.set_sensor_height_px(channel.sensor_height_px);
 }

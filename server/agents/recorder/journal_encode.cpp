@@ -74,6 +74,8 @@ bool decision(std::span<const std::byte> bytes, v1::FrameDecision& out) {
   out.set_rendered(line.rendered);
   out.set_trigger_number(line.trigger_number);
   out.set_slot_begin_ns(line.slot_begin_ns);
+  out.set_applied_shift_x_px(line.shift_px.x);
+  out.set_applied_shift_y_px(line.shift_px.y);
   for (std::uint32_t i = 0; i < line.entity_count; ++i) {
     protocol::EntityStateData state;
     state.entity_id = entities[i].entity_id;

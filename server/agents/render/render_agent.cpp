@@ -39,6 +39,7 @@ int RenderAgent::do_work(std::int64_t now_ns) noexcept {
   if (lost_) {
     return 0;
   }
+  take_feedback();
   if (finish_oldest()) {
     ++work;
   }
@@ -93,8 +94,9 @@ bool RenderAgent::take_job() noexcept {
       }
       starved_ = false;
       job_prepared_ = false;
-      in_flight_[(first_ + count_) % kDepth] = {*slot,    submitted_ns,  expected_ms,
-                                                begun_ns, job->channels, warmed_up};
+      in_flight_[(first_ + count_) % kDepth] = {*slot,         job->attitude, job->display_ns,
+                                                submitted_ns,  expected_ms,   begun_ns,
+                                                job->channels, warmed_up};
       ++count_;
       context_.counters.add(Counter::frames_submitted);
       break;
@@ -227,6 +229,7 @@ bool RenderAgent::finish_oldest() noexcept {
   done->image.source = source_.get();
   done->image.slot = oldest.slot;
   done->image.channels = oldest.channels;
+  find_shift(oldest, *done);
   take_pictures(view, done->image);
   context_.done.commit();
   context_.counters.add(Counter::frames_rendered);
@@ -236,6 +239,26 @@ bool RenderAgent::finish_oldest() noexcept {
   return true;
 }
 
+void RenderAgent::take_feedback() noexcept {
+  while (const AxisFeedback* feedback = context_.shift_feedback.front()) {
+    if (shifts_) shifts_->add(*feedback);
+    context_.shift_feedback.pop();
+  }
+}
+
+void RenderAgent::find_shift(const InFlight& frame, RenderDone& done) noexcept {
+  done.shift_known = true;
+  done.image.shift_px = glm::vec2(0.0F);
+  if (!shifts_) return;
+  take_feedback();
+  if (const auto shift_px = shifts_->shift_px(frame.attitude, frame.display_ns)) {
+    done.image.shift_px = *shift_px;
+    return;
+  }
+  done.shift_known = false;
+  context_.counters.add(Counter::output_shifts_unknown);
+}
+
 void RenderAgent::take_pictures(const renderer::FrameView& view, Image& image) noexcept {
   const std::span<Picture> pictures(context_.pictures);
   for (std::size_t i = 0; i < pictures.size(); ++i) {
@@ -243,7 +266,10 @@ void RenderAgent::take_pictures(const renderer::FrameView& view, Image& image) n
       image.pictures[i] = {};
       continue;
     }
-    image.pictures[i] = cut_out(pictures[i], view, image.slot);
+    const TakenPicture taken = take_picture(pictures[i], view, image.slot, image.shift_px);
+    image.pictures[i] = taken.pixels;
+    image.clamped_px[i] = taken.clamped_px;
+    context_.counters.add(Counter::output_px_clamped, taken.clamped_px);
     // Planes that share memory (canned frames) are summed once.
     const bool same = i > 0 && image.pictures[i].data() == image.pictures[i - 1].data() &&
                       image.pictures[i].size() == image.pictures[i - 1].size();

@@ -8,6 +8,7 @@
 #include "agents/agent.hpp"
 #include "agents/context.hpp"
 #include "agents/frame_source.hpp"
+#include "motion/shift_finder.hpp"
 #include "pacing/quality_policy.hpp"
 
 namespace emit::server {
@@ -37,10 +38,15 @@ class RenderAgent final : public Agent {
   /// Returns the source's description, or the reason why there is none. Call it after on_start, and
   /// not while the agent runs.
   [[nodiscard]] const physics::Result<SourceInfo>& source_info() const noexcept { return info_; }
+  /// Lets pictures shift with the axes of a motion simulator. The plan outlives the agent. Call it
+  /// before frames are asked for.
+  void shift_by(const MotionPlan& plan) noexcept { shifts_.emplace(plan); }
 
  private:
   struct InFlight {
     renderer::SlotIndex slot = 0;
+    ShownAttitude attitude;
+    std::int64_t display_ns = 0;
     std::int64_t render_start_ns = 0;
     double expected_ms = 0.0;   ///< time of its quality level, by the ladder
     std::int64_t begun_ns = 0;  ///< monotonic; render_start_ns is TAI
@@ -61,6 +67,10 @@ class RenderAgent final : public Agent {
   [[nodiscard]] std::optional<renderer::SlotIndex> submit(const renderer::FrameRequest& request,
                                                           bool& warmed_up) noexcept;
   bool finish_oldest() noexcept;
+  /// Takes what the axes of a motion simulator measured.
+  void take_feedback() noexcept;
+  /// Finds the shift of the frame by the newest measurements, where pictures shift.
+  void find_shift(const InFlight& frame, RenderDone& done) noexcept;
   /// Takes the images of image.channels, and their checksums.
   void take_pictures(const renderer::FrameView& view, Image& image) noexcept;
   /// Chooses the quality level of the job. Returns its QualityLevelStats::frame_ms.
@@ -80,6 +90,7 @@ class RenderAgent final : public Agent {
   std::size_t first_ = 0;
   std::size_t count_ = 0;
   QualityPolicy quality_;
+  std::optional<ShiftFinder> shifts_;  // empty: no picture shifts
   std::int64_t wake_at_ns_ = kNeverNs;
   std::uint32_t failures_ = 0;  // of the device, in a row
   bool lost_ = false;

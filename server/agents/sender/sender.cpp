@@ -28,9 +28,7 @@ void Sender::allow_compression() {
   encoded_.reserve(window_.size() * context_.pictures.size());
   for (std::size_t place = 0; place < window_.size(); ++place) {
     for (const Picture& picture : context_.pictures) {
-      encoded_.push_back({protocol::PixelEncoder(std::size_t{picture.window_px.width_px} *
-                                                 picture.window_px.height_px * sizeof(float)),
-                          false});
+      encoded_.push_back({protocol::PixelEncoder(picture.pixels() * sizeof(float)), false});
     }
   }
 }

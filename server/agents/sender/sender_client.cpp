@@ -32,10 +32,28 @@ protocol::FrameHeader SenderClient::header_for(const Channel& channel,
   out.height_px = channel.height_px;
   out.band_lo_um = static_cast<float>(channel.band_lo_um);
   out.band_hi_um = static_cast<float>(channel.band_hi_um);
-  out.window_x_px = channel.window_x_px;
-  out.window_y_px = channel.window_y_px;
-  out.sensor_width_px = channel.sensor_width_px;
-  out.sensor_height_px = channel.sensor_height_px;
+  out.output_steps = channel.output_steps;
+  // Pixels that do not lie as in the sensor's image have no window there.
+  if ((channel.output_steps & protocol::kOutputMoved) == 0) {
+    out.window_x_px = channel.window_px.x_px;
+    out.window_y_px = channel.window_px.y_px;
+    out.sensor_width_px = channel.sensor_width_px;
+    out.sensor_height_px = channel.sensor_height_px;
+  }
+  if ((channel.output_steps & protocol::kOutputShifted) != 0) {
+    out.applied_shift_x_px = image.shift_px.x;
+    out.applied_shift_y_px = image.shift_px.y;
+    // 0 remains, unless the image is shown again and the axes have moved on.
+    out.shift_x_px -= image.shift_px.x;
+    out.shift_y_px -= image.shift_px.y;
+  }
+  if ((channel.output_steps & (protocol::kOutputCorrected | protocol::kOutputDriven)) != 0) {
+    out.quantity = protocol::PixelQuantity::drive;
+  }
+  if (const std::uint32_t clamped_px = image.clamped_px[channel.picture]; clamped_px > 0) {
+    out.clamped_px += clamped_px;
+    out.flags |= protocol::kFlagClamped;
+  }
   out.payload_bytes = image.pictures[channel.picture].size_bytes();
   out.payload_crc32c = image.crc32c[channel.picture];
   return out;

@@ -60,10 +60,16 @@ physics::Result<void> save(const std::filesystem::path& directory,
                       frame.header.height_px};
   planes.sensor_width_px = frame.header.sensor_width_px;
   planes.sensor_height_px = frame.header.sensor_height_px;
+  planes.output_steps = frame.header.output_steps;
+  planes.applied_shift_x_px = frame.header.applied_shift_x_px;
+  planes.applied_shift_y_px = frame.header.applied_shift_y_px;
   const bool temperature = frame.header.quantity == protocol::PixelQuantity::temperature_k;
-  (temperature ? planes.temperature_k : planes.radiance_w_m2_sr) = frame.pixels;
+  const bool drive = frame.header.quantity == protocol::PixelQuantity::drive;
+  (drive         ? planes.drive
+   : temperature ? planes.temperature_k
+                 : planes.radiance_w_m2_sr) = frame.pixels;
   // The band of a channel does not change: one table serves every frame.
-  if (!temperature && !apparent) {
+  if (!temperature && !drive && !apparent) {
     if (const auto band = channel.spectral_band()) apparent.emplace(*band);
   }
   std::vector<float> valid;
@@ -81,7 +87,9 @@ physics::Result<void> save(const std::filesystem::path& directory,
                      channel.band,
                      channel.band_lo_um,
                      channel.band_hi_um,
-                     temperature ? "K" : "W m-2 sr-1",
+                     drive         ? "drive"
+                     : temperature ? "K"
+                                   : "W m-2 sr-1",
                      channel.response};
   return write_frame_files(directory, planes, style);
 }
@@ -352,6 +360,8 @@ Json Reception::json() const {
   json.set("band", channel.band).set("width", channel.width_px);
   json.set("height", channel.height_px);
   json.set("window_x", channel.window_x_px).set("window_y", channel.window_y_px);
+  json.set("window_width", channel.window_width_px).set("window_height", channel.window_height_px);
+  json.set("output", output_text(channel.output_steps));
   json.set("sensor_width", channel.sensor_width_px);
   json.set("sensor_height", channel.sensor_height_px).set("frames", report_.frames());
   json.set("seconds", std::chrono::duration<double>(last_frame_ - start_).count());

@@ -174,7 +174,8 @@ std::string Viewer::cursor_text() const {
   const std::size_t index =
       static_cast<std::size_t>(at->y_px) * frame_.width_px + static_cast<std::size_t>(at->x_px);
   std::string text =
-      fmt::format("{} {}  {:.4g} W/M2/SR", at->x_px, at->y_px, frame_.radiance_w_m2_sr[index]);
+      fmt::format("{} {}  {:.4g} {}", at->x_px, at->y_px, frame_.radiance_w_m2_sr[index],
+                  frame_.drive ? "DRIVE" : "W/M2/SR");
   if (!frame_.temperature_k.empty()) {
     const float kelvin = frame_.temperature_k[index];
     text += std::isnan(kelvin) ? "  SKY"
@@ -189,7 +190,7 @@ void Viewer::draw(image::RgbImage* read_back) {
   options.min_value = limits().low;
   options.max_value = limits().high;
   options.color_bar = true;
-  options.unit = show_radiance_ ? "W" : "K";
+  options.unit = frame_.drive ? "" : show_radiance_ ? "W" : "K";
   auto picture = image::false_color(values(), frame_.width_px, frame_.height_px, options);
   if (!picture) return;
   const std::string cursor = cursor_text();

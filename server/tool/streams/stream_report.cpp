@@ -3,10 +3,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 
 #include "tool/support/console.hpp"
+#include "tool/support/frame_files.hpp"
 
 namespace emit::tool {
 namespace {
@@ -58,6 +60,11 @@ void StreamReport::add(const client::ReceivedFrame& frame) {
   }
 
   motion_frames_ += header.motion_state != protocol::MotionState::none ? 1U : 0U;
+  if ((header.output_steps & protocol::kOutputShifted) != 0) {
+    ++shifted_frames_;
+    largest_shift_px_ = std::max(largest_shift_px_,
+                                 std::hypot(header.applied_shift_x_px, header.applied_shift_y_px));
+  }
   if (header.motion_state == protocol::MotionState::following && header.motion_faults == 0 &&
       header.display_ns != 0 && std::isfinite(header.pointing_error_px)) {
     const double error_px = header.pointing_error_px;
@@ -96,14 +103,19 @@ std::string StreamReport::motion_line() const {
                 "pointing error RMS {:.4f}  p99 {:.4f}  max {:.4f} px  ({} frames)",
                 std::sqrt(pointing_squares_px2_ / static_cast<double>(pointing_px_.count())),
                 pointing_px_.percentile(0.99), pointing_px_.max(), pointing_px_.count());
-  return fmt::format("motion simulator: {} of {} frames flagged; {}\n",
-                     flagged(protocol::kFlagMotionFault), motion_frames_, pointing);
+  const std::string shifts =
+      shifted_frames_ == 0
+          ? std::string()
+          : fmt::format("; emitd moved the pixels by up to {:.3f} px", largest_shift_px_);
+  return fmt::format("motion simulator: {} of {} frames flagged; {}{}\n",
+                     flagged(protocol::kFlagMotionFault), motion_frames_, pointing, shifts);
 }
 
 Json StreamReport::motion_json() const {
   Json json = Json::object();
   json.set("frames", motion_frames_).set("flagged", flagged(protocol::kFlagMotionFault));
   json.set("pointing_frames", pointing_px_.count());
+  json.set("shifted_frames", shifted_frames_).set("largest_shift_px", largest_shift_px_);
   if (!pointing_px_.empty()) {
     json.set("pointing_rms_px",
              std::sqrt(pointing_squares_px2_ / static_cast<double>(pointing_px_.count())));
@@ -169,9 +181,11 @@ Json counters_json(const client::ReceiveCounters& c) {
 }
 
 std::string channel_text(const client::ChannelDescription& channel) {
-  return fmt::format("channel {} '{}' ({}, sensor {}, band {} {:g}-{:g} um, {}x{})", channel.index,
-                     channel.name, channel.kind, channel.sensor, channel.band, channel.band_lo_um,
-                     channel.band_hi_um, channel.width_px, channel.height_px);
+  const std::string output = output_text(channel.output_steps);
+  return fmt::format("channel {} '{}' ({}, sensor {}, band {} {:g}-{:g} um, {}x{}{}{})",
+                     channel.index, channel.name, channel.kind, channel.sensor, channel.band,
+                     channel.band_lo_um, channel.band_hi_um, channel.width_px, channel.height_px,
+                     output.empty() ? "" : "; ", output);
 }
 
 }  // namespace emit::tool

@@ -80,7 +80,9 @@ class StreamReport {
   Samples pointing_px_{kMaxSamples};
   double pointing_squares_px2_ = 0.0;
   std::uint64_t motion_frames_ = 0;  // with a motion simulator
-  std::int64_t last_byte_ns_ = 0;    // of the frame before, on this connection
+  std::uint64_t shifted_frames_ = 0;
+  float largest_shift_px_ = 0.0F;
+  std::int64_t last_byte_ns_ = 0;  // of the frame before, on this connection
   std::array<std::uint64_t, 32> flag_counts_{};
   std::uint64_t frames_ = 0;
   std::uint64_t pixel_bytes_ = 0;

@@ -10,6 +10,7 @@
 
 #include "emit/image/png_image.hpp"
 #include "emit/physics/check.hpp"
+#include "emit/protocol/frame_header.hpp"
 
 namespace emit::tool {
 namespace {
@@ -103,6 +104,24 @@ std::vector<float> ApparentTemperature::kelvin(std::span<const float> radiance_w
   return out;
 }
 
+std::string output_text(std::uint8_t output_steps) {
+  using namespace protocol;
+  std::string out;
+  const auto add = [&](bool so, const std::string& text) {
+    if (so) out += (out.empty() ? "" : ", ") + text;
+  };
+  add((output_steps & kOutputMirroredHorizontally) != 0, "mirror horizontal");
+  add((output_steps & kOutputMirroredVertically) != 0, "mirror vertical");
+  const int rotate_deg = ((output_steps & kOutputRotated90) != 0 ? 90 : 0) +
+                         ((output_steps & kOutputRotated180) != 0 ? 180 : 0);
+  add(rotate_deg != 0, fmt::format("rotate {}", rotate_deg));
+  add((output_steps & kOutputDistorted) != 0, "distortion");
+  add((output_steps & kOutputShifted) != 0, "shift");
+  add((output_steps & kOutputCorrected) != 0, "non-uniformity");
+  add((output_steps & kOutputDriven) != 0, "drive table");
+  return out;
+}
+
 physics::Result<void> write_frame_exr(const std::filesystem::path& file, const FramePlanes& frame) {
   image::ExrImage exr;
   exr.width_px = frame.width_px;
@@ -111,6 +130,7 @@ physics::Result<void> write_frame_exr(const std::filesystem::path& file, const F
     if (!plane.empty()) exr.add(name, plane);
   };
   add(image::kRadianceChannel, frame.radiance_w_m2_sr);
+  add(image::kDriveChannel, frame.drive);
   add(image::kTemperatureChannel, frame.temperature_k);
   add(image::kDepthChannel, frame.depth_m);
   add(image::kObjectChannel, frame.object_id);
@@ -124,6 +144,13 @@ physics::Result<void> write_frame_exr(const std::filesystem::path& file, const F
     exr.attributes["windowYPx"] = std::to_string(frame.window_px.y_px);
     exr.attributes["sensorWidthPx"] = std::to_string(frame.sensor_width_px);
     exr.attributes["sensorHeightPx"] = std::to_string(frame.sensor_height_px);
+  }
+  if (frame.output_steps != 0) {
+    exr.attributes["outputSteps"] = output_text(frame.output_steps);
+  }
+  if ((frame.output_steps & protocol::kOutputShifted) != 0) {
+    exr.attributes["appliedShiftXPx"] = double{frame.applied_shift_x_px};
+    exr.attributes["appliedShiftYPx"] = double{frame.applied_shift_y_px};
   }
   image::set_frame_metadata(exr, frame.metadata);
   return image::write_exr(file, exr);
@@ -146,10 +173,11 @@ struct PngValues {
   double max_value = 1.0;
 };
 
-PngValues radiance_values(const FramePlanes& frame) {
+/// Returns values between their 1st and 99th percentile.
+PngValues ranged_values(std::span<const float> values, const std::string& unit) {
   PngValues out;
-  out.values = frame.radiance_w_m2_sr;
-  out.unit = "W";
+  out.values = values;
+  out.unit = unit;
   const auto range = image::percentile_range(out.values, 1.0, 99.0);
   out.min_value = range ? range->min_value : 0.0;
   out.max_value =
@@ -158,6 +186,7 @@ PngValues radiance_values(const FramePlanes& frame) {
 }
 
 physics::Result<PngValues> png_values(const FramePlanes& frame, const PngStyle& style) {
+  if (!frame.drive.empty()) return ranged_values(frame.drive, "");
   PngValues out;
   out.unit = "K";
   out.min_value = style.min_k;
@@ -173,13 +202,13 @@ physics::Result<PngValues> png_values(const FramePlanes& frame, const PngStyle& 
     out.values = frame.temperature_k;
     return out;
   }
-  if (style.quantity == PngQuantity::radiance) return radiance_values(frame);
+  if (style.quantity == PngQuantity::radiance) return ranged_values(frame.radiance_w_m2_sr, "W");
   if (frame.apparent != nullptr) {
     out.made = frame.apparent->kelvin(frame.radiance_w_m2_sr);
   } else if (const auto band = spectral_band(frame.metadata)) {
     out.made = ApparentTemperature(*band).kelvin(frame.radiance_w_m2_sr);
   } else {
-    return radiance_values(frame);  // a canned frame of no band
+    return ranged_values(frame.radiance_w_m2_sr, "W");  // a canned frame of no band
   }
   out.values = out.made;
   return out;

@@ -55,6 +55,7 @@ struct FramePlanes {
   std::uint32_t height_px = 0;
   std::span<const float> radiance_w_m2_sr;
   std::span<const float> temperature_k;
+  std::span<const float> drive;  ///< command of a projector's emitters, in place of radiance
   std::span<const float> depth_m;
   std::span<const float> object_id;
   /// Mask of the pixels: 1 where a pixel arrived, else 0. If it is not empty, the frame is marked
@@ -69,7 +70,15 @@ struct FramePlanes {
   scene::PixelRect window_px;
   std::uint32_t sensor_width_px = 0;
   std::uint32_t sensor_height_px = 0;
+  // Steps that the pixels went through after the window (protocol::OutputSteps), and their shift.
+  std::uint8_t output_steps = 0;
+  float applied_shift_x_px = 0.0F;
+  float applied_shift_y_px = 0.0F;
 };
+
+/// Returns what protocol::OutputSteps say, for people: "mirror horizontal, rotate 90, shift". The
+/// text is empty where nothing was done.
+[[nodiscard]] std::string output_text(std::uint8_t output_steps);
 
 /// Quantity that the colours of a picture stand for.
 enum class PngQuantity : unsigned char {
@@ -92,9 +101,9 @@ struct PngStyle {
 
 [[nodiscard]] physics::Result<void> write_frame_exr(const std::filesystem::path& file,
                                                     const FramePlanes& frame);
-/// Writes a false-colour PNG. Apparent temperature falls back to radiance for a frame of no band,
-/// and to the frame's temperature where it has no radiance. Errors: invalid_argument (the frame
-/// lacks the quantity), io.
+/// Writes a false-colour PNG. Drive is shown between its 1st and 99th percentile. Apparent
+/// temperature falls back to radiance for a frame of no band, and to the frame's temperature where
+/// it has no radiance. Errors: invalid_argument (the frame lacks the quantity), io.
 [[nodiscard]] physics::Result<void> write_frame_png(const std::filesystem::path& file,
                                                     const FramePlanes& frame,
                                                     const PngStyle& style);

@@ -37,6 +37,7 @@ struct ViewFrame {
   std::vector<float> radiance_w_m2_sr;
   std::vector<float> temperature_k;  ///< of the surface, or apparent; see apparent_temperature
   bool apparent_temperature = false;
+  bool drive = false;  ///< the radiance is the drive of a projector's emitters instead
   std::uint64_t frame_number = 0;
   std::int64_t sim_time_ns = 0;
   std::uint32_t flags = 0;

@@ -16,6 +16,7 @@
 #include "rt/fd.hpp"
 #include "support/fake_clock.hpp"
 #include "support/heap_counter.hpp"
+#include "support/output_files.hpp"
 
 namespace emit::server {
 namespace {
@@ -26,6 +27,23 @@ TEST(SteadyState, NoAgentOnTheFramePathAllocates) {
   Context context(clock, 1u << 20, 4);
   const std::optional<scene::ScenarioDesc> no_scenario;
   const ScenarioTracks tracks(no_scenario);
+  // One channel shows the image as it is, the other one has every step of an output.
+  const test::OutputFiles files;
+  scene::ScenarioDesc scenario;
+  scenario.bands = {{"8-12", 8.0, 12.0, {}}};
+  scenario.channels = {{"all", scene::ChannelKind::projector, "8-12"},
+                       {"driven", scene::ChannelKind::projector, "8-12", {4, 4, 40, 30}}};
+  scene::ChannelOutput& output = scenario.channels[1].output;
+  output.mirror = scene::PictureMirror::both;
+  output.rotate_deg = 90;
+  output.apply_shift = true;
+  output.distortion_file = files.map("map.exr", {30, 40}, [](double x, double y) {
+    return protocol::ImagePoint{x, y};
+  });
+  output.nuc_file = files.exr("nuc.exr", {30, 40},
+                              {{"gain", [](double, double) { return 1.0; }},
+                               {"offset", [](double, double) { return 0.5; }}});
+  output.drive_table_file = files.text("drive.csv", "radiance_w_m2_sr,drive\n0,0\n50,1000\n");
   config::SourceConfig source;
   source.canned_width_px = 64;
   source.canned_height_px = 48;
@@ -33,7 +51,7 @@ TEST(SteadyState, NoAgentOnTheFramePathAllocates) {
   RenderAgent render(context, [&] { return make_canned_source(source, 7, 1); });
   Conductor conductor(context, tracks, {});
   ASSERT_TRUE(render.on_start() && conductor.on_start());
-  auto table = *make_channels(no_scenario, *render.source_info());
+  auto table = *make_channels(scenario, *render.source_info());
   context.channels = std::move(table.channels);
   context.pictures = std::move(table.pictures);
   config::StreamConfig stream;

@@ -262,6 +262,56 @@ INSTANTIATE_TEST_SUITE_P(Pacing, DaemonReplay,
                                                                                     : "Trigger";
                          });
 
+/// The checksum of a frame is that of its first channel, with everything that is done to its
+/// picture, and the journal has the shift.
+TEST(JournalPlayer, MovesThePictureByTheShiftOfTheJournal) {
+  scene::ScenarioDesc scenario;
+  scenario.bands = {{"8-12", 8.0, 12.0, {}}};
+  scenario.channels = {{"shown", scene::ChannelKind::projector, "8-12", {4, 2, 20, 10}}};
+  scenario.channels[0].output.apply_shift = true;
+  scenario.channels[0].output.rotate_deg = 180;
+  SourceScript script;
+  ScriptedSource source(script, 32, 16, 2);
+  JournalPlayer player(source, *make_channels(scenario, source.info()));
+  v1::JournalEntry entry;
+  entry.set_sequence(1);
+  entry.mutable_run_start()->set_run_id(1);
+  ASSERT_TRUE(player.apply(entry).has_value());
+  std::vector<std::uint32_t> sums;
+  for (const float shift_px : {0.0F, 0.375F}) {
+    entry.Clear();
+    entry.set_sequence(2 + sums.size());
+    entry.mutable_frame()->set_rendered(true);
+    entry.mutable_frame()->mutable_sensor_pose()->mutable_position_m();
+    entry.mutable_frame()->mutable_sensor_pose()->mutable_world_from_body()->set_w(1.0);
+    entry.mutable_frame()->set_applied_shift_x_px(shift_px);
+    entry.mutable_frame()->set_applied_shift_y_px(-shift_px);
+    const auto frame = player.apply(entry);
+    ASSERT_TRUE(frame.has_value()) << frame.error().text;
+    ASSERT_TRUE(frame->has_value());
+    // The turned window, moved along rows and columns, computed here.
+    const auto plane = (*frame)->view->radiance_w_m2_sr[0];
+    std::vector<float> expected;
+    for (std::size_t y = 0; y < 10; ++y) {
+      for (std::size_t x = 0; x < 20; ++x) {
+        const std::size_t column = 4 + 19 - x;
+        const std::size_t row = 2 + 9 - y;
+        const auto at = [&](std::size_t c, std::size_t r) { return plane[r * 32 + c]; };
+        // A shift to the right by a fraction f mixes in the left neighbour; upwards, the lower one.
+        const auto moved_right = [&](std::size_t r) {
+          if (shift_px == 0.0F) return at(column, r);
+          return at(column - 1, r) + (1.0F - shift_px) * (at(column, r) - at(column - 1, r));
+        };
+        const float left = moved_right(row);
+        const float lower_left = moved_right(row + 1);
+        expected.push_back(left + shift_px * (lower_left - left));
+      }
+    }
+    EXPECT_EQ((*frame)->crc32c, protocol::crc32c(std::as_bytes(std::span(expected)))) << shift_px;
+    sums.push_back((*frame)->crc32c);
+  }
+}
+
 TEST(JournalPlayer, RefusesAJournalWithAHole) {
   Replay replay;
   v1::JournalEntry entry;

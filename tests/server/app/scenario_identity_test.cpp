@@ -52,6 +52,23 @@ TEST(ScenarioIdentity, DoesNotHangOnWhereTheWarmedUpStateIsKept) {
   EXPECT_EQ(files.hash(), before);
 }
 
+TEST(ScenarioIdentity, FollowsTheFilesOfOutputsAndNotTheirFolder) {
+  const auto with_table = [](const std::string& text) {
+    auto files = std::make_unique<Files>();
+    files->folder.write("drive.csv", text);
+    files->scenario.channels = {{"a", scene::ChannelKind::projector, "8-12"}};
+    files->scenario.channels[0].output.drive_table_file = files->folder.file("drive.csv");
+    return files;
+  };
+  const std::string table = "radiance_w_m2_sr,drive\n0,0\n1,1\n";
+  EXPECT_EQ(with_table(table)->hash(), with_table(table)->hash());
+  EXPECT_NE(with_table(table)->hash(), with_table(table + "2,2\n")->hash());
+  auto files = with_table(table);
+  const std::string before = files->hash();
+  files->scenario.channels[0].output.rotate_deg = 90;
+  EXPECT_NE(files->hash(), before) << "settings count too";
+}
+
 TEST(ScenarioIdentity, FollowsBuffersBesideAGltfFile) {
   const Files files;
   const std::string before = files.hash();

@@ -174,6 +174,20 @@ TEST(CliBench, StreamMeasuresOnlyWhatIsNamed) {
   EXPECT_EQ(run_emit({"bench", "stream", "--only", "tcp", "--transport", "udp"}).exit_code, 2);
 }
 
+TEST(CliBench, OutputMeasuresEveryStepBesideACopy) {
+  const TemporaryFolder folder;
+  const ProcessResult run = run_emit({"bench", "output", "--rounds", "3", "--width", "64",
+                                      "--height", "48", "--json", folder.file("o.json")});
+  ASSERT_EQ(run.exit_code, 0) << run.err << run.out;
+  const std::string json = read_text(folder.file("o.json"));
+  EXPECT_EQ(json_value(json, "suite"), "\"output\"");
+  const auto ratios = numbers_of(json, "ratio_to_copy");
+  ASSERT_EQ(ratios.size(), 10U);
+  EXPECT_EQ(ratios[0], 1.0) << "the copy";
+  for (const double ratio : ratios) EXPECT_GT(ratio, 0.0);
+  EXPECT_EQ(numbers_of(json, "median_ms").size(), 10U);
+}
+
 TEST(CliBench, IsolationComparesPairsOfRunsBesideARunAgainstItself) {
   const TemporaryFolder folder;
   const ProcessResult run = run_emit({"bench", "isolation", "--frames", "20", "--rate", "100",

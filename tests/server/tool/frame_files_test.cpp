@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "emit/physics/planck.hpp"
+#include "emit/protocol/frame_header.hpp"
 #include "tool/support/scene_options.hpp"
 
 namespace emit::tool {
@@ -55,6 +56,29 @@ TEST(CliFrameFiles, a_partial_frame_says_which_pixels_never_arrived) {
   ASSERT_NE(channel, nullptr);
   EXPECT_EQ(channel->pixels, valid);
   EXPECT_TRUE(partial->attributes.contains("missingPx"));
+}
+
+TEST(CliFrameFiles, a_frame_of_drive_is_no_radiance_and_says_what_was_done) {
+  const TemporaryFolder folder;
+  const std::vector<float> pixels{100.0F, 200.0F, 300.0F, 4095.0F};
+  FramePlanes frame;
+  frame.width_px = frame.height_px = 2;
+  frame.drive = pixels;
+  frame.output_steps = protocol::kOutputMirroredVertically | protocol::kOutputRotated90 |
+                       protocol::kOutputRotated180 | protocol::kOutputShifted |
+                       protocol::kOutputDriven;
+  frame.applied_shift_x_px = 0.25F;
+  frame.applied_shift_y_px = -0.5F;
+  ASSERT_TRUE(write_frame_files(folder.path(), frame, {280.0, 330.0}).has_value());
+  const auto read = image::read_exr(folder.path() / "frame_000000.exr");
+  ASSERT_TRUE(read.has_value()) << read.error().text;
+  EXPECT_EQ(read->find(image::kRadianceChannel), nullptr);
+  ASSERT_NE(read->find(image::kDriveChannel), nullptr);
+  EXPECT_EQ(read->find(image::kDriveChannel)->pixels, pixels);
+  EXPECT_EQ(std::get<std::string>(read->attributes.at("outputSteps")),
+            "mirror vertical, rotate 270, shift, drive table");
+  EXPECT_EQ(std::get<double>(read->attributes.at("appliedShiftXPx")), 0.25);
+  EXPECT_EQ(std::get<double>(read->attributes.at("appliedShiftYPx")), -0.5);
 }
 
 TEST(CliApparentTemperature, inverts_the_band_integral_to_a_millikelvin) {

@@ -60,10 +60,13 @@ TEST(MotionRun, a_real_loop_follows_is_flagged_when_it_does_not_and_replays) {
   folder.write("world.toml",
                "epoch_utc = 2020-06-21T06:00:00Z\n[place]\nlat_deg = 48.0\nlon_deg = 11.0\n"
                "[[object]]\ngltf = \"share:scenes/box.glb\"\n[[channel]]\nname = \"shown\"\n"
-               "kind = \"projector\"\nband = \"8-12\"\n"
+               "kind = \"projector\"\nband = \"8-12\"\nwindow_px = [4, 4, 24, 16]\n"
+               "mirror = \"horizontal\"\nrotate_deg = 90\napply_shift = true\n"
+               "drive_table_file = \"drive.csv\"\n"
                "[sensor]\nposition_m = [0.0, -8.0, 1.0]\nlook_at_m = [0.0, 0.0, 1.0]\n"
                "width_px = 32\nheight_px = 24\n[thermal]\nmethod = \"cached\"\n"
                "max_samples = 2000\n");
+  folder.write("drive.csv", "radiance_w_m2_sr,drive\n0,0\n30,1000\n60,4095\n");
   std::string axes;
   for (int i = 0; i < 3; ++i) {
     axes += "{ min_deg = -100, max_deg = 100, rate_deg_s = 300, acceleration_deg_s2 = 5000 }, ";
@@ -106,6 +109,7 @@ TEST(MotionRun, a_real_loop_follows_is_flagged_when_it_does_not_and_replays) {
   EXPECT_EQ(receiver.wait(), 0) << receiver.err();
   const std::string report = folder.read("receive.json");
   EXPECT_GT(std::stoi("0" + json_value(report, "pointing_frames")), 0) << report;
+  EXPECT_GT(std::stoi("0" + json_value(report, "shifted_frames")), 0) << report;
   // The daemon switches the motors off when it ends.
   EXPECT_TRUE(wait_until([&] { return table.err().rfind("motors off") != std::string::npos; }))
       << table.err();

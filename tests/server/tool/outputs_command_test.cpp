@@ -76,6 +76,7 @@ const std::vector<OutputCase>& output_cases() {
     add({"bench", "error-vs-time"}, {"--json", "--csv", "--plot"}, {"--figures"});
     add({"bench", "stream"}, {"--json"});
     add({"bench", "isolation"}, {"--json"});
+    add({"bench", "output"}, {"--json"});
     add({"bench", "stability"}, {"--json"}, {"--pictures"});
     add({"bench", "convergence"}, {"--json", "--plot"});
     add({"bench", "thermal-truth"}, {"--json"}, {"--pictures"});

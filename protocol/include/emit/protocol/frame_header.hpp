@@ -21,8 +21,32 @@ inline constexpr std::size_t kFrameHeaderBytes = 320;
 
 /// Number format of a pixel.
 enum class PixelFormat : std::uint8_t { float32 = 1 };
-/// Physical quantity of a pixel: radiance within the band, W m-2 sr-1, or temperature, K.
-enum class PixelQuantity : std::uint8_t { radiance_w_m2_sr = 1, temperature_k = 2 };
+/// Physical quantity of a pixel.
+enum class PixelQuantity : std::uint8_t {
+  radiance_w_m2_sr = 1,  ///< radiance within the band, W m-2 sr-1
+  temperature_k = 2,
+  /// Command for an emitter of a projector: radiance after a correction of non-uniformity, or the
+  /// drive that a table of the channel gives for it. It is not the radiance of the scene.
+  drive = 3,
+};
+
+/// Steps that the pixels went through after they were cut out of the sensor's image, as bits. A
+/// frame with one of the first five has no window in its header: its pixels do not lie as in the
+/// sensor's image. docs/wire.md section 3 says where they come from.
+enum OutputSteps : std::uint8_t {
+  kOutputMirroredHorizontally = 1u << 0,  ///< columns are in reverse order
+  kOutputMirroredVertically = 1u << 1,    ///< rows are in reverse order
+  kOutputRotated90 = 1u << 2,             ///< rotated clockwise by 90 degrees, after the mirror
+  kOutputRotated180 = 1u << 3,            ///< rotated by 180 degrees; with the bit before, by 270
+  kOutputDistorted = 1u << 4,             ///< resampled by the channel's distortion map
+  kOutputShifted = 1u << 5,               ///< moved by applied_shift_*_px
+  kOutputCorrected = 1u << 6,             ///< gain and offset of each pixel were applied
+  kOutputDriven = 1u << 7,                ///< a table made drive of radiance
+};
+/// Steps after which a pixel's place no longer tells its place in the sensor's image.
+inline constexpr std::uint8_t kOutputMoved = kOutputMirroredHorizontally |
+                                             kOutputMirroredVertically | kOutputRotated90 |
+                                             kOutputRotated180 | kOutputDistorted;
 
 /// Encoding of the pixels on the wire. Only clients that asked for another encoding than raw
 /// receive one.
@@ -144,13 +168,18 @@ struct FrameHeader {
   MotionState motion_state = MotionState::none;
   std::uint8_t motion_faults = 0;  ///< MotionFaults
   /// Projector: shift of the image, right and down, that brings it to where the axes are at
-  /// display_ns, as far as they were known when the frame was published.
+  /// display_ns, as far as they were known when the frame was published. It is what remains to be
+  /// done: 0 where emitd has applied it, except in repeated frames.
   float shift_x_px = 0.0F;
   float shift_y_px = 0.0F;
   /// Projector: error of direction that the shift left in the centre of the newest frame whose
   /// axes were measured up to its display. NaN: none was.
   float pointing_error_px = 0.0F;
-  std::int64_t display_ns = 0;  ///< wall instant for which the axes were predicted
+  std::int64_t display_ns = 0;    ///< wall instant for which the axes were predicted
+  std::uint8_t output_steps = 0;  ///< OutputSteps
+  /// Shift that emitd has applied, with kOutputShifted; right and down in the sensor's image.
+  float applied_shift_x_px = 0.0F;
+  float applied_shift_y_px = 0.0F;
 };
 
 /// Largest n that a client may ask for in "every n-th frame".

@@ -8,7 +8,7 @@ from .crc32c import crc32c
 from .errors import (ArgumentError, ClosedError, ConnectError, DeadlineError, EmitError, OverwrittenError,
                      ProtocolError, RefusedError)
 from .frame_client import FrameClient, StreamTerms
-from .frame_header import FLAG_NAMES, FrameHeader, parse_frame_header
+from .frame_header import FLAG_NAMES, OUTPUT_STEP_NAMES, FrameHeader, parse_frame_header
 from .frames import ReceiveCounters, ReceivedFrame
 from .host_client import Command, HostClient
 from .host_frames import EntityState, Environment, HostFrame, Pose, attitude
@@ -17,7 +17,7 @@ from .server_info import Channel, ServerInfo, Status, StatusCode
 
 __all__ = [
     "ArgumentError", "Channel", "ClosedError", "Command", "ConnectError", "DeadlineError", "EmitError", "EntityState",
-    "Environment", "FLAG_NAMES", "FrameClient", "FrameHeader", "HostClient", "HostFrame", "OverwrittenError", "Pose",
-    "ProtocolError", "ReceiveCounters", "ReceivedFrame", "RefusedError", "Security", "ServerInfo", "Status",
-    "StatusCode", "StreamTerms", "attitude", "crc32c", "parse_frame_header"
+    "Environment", "FLAG_NAMES", "FrameClient", "FrameHeader", "HostClient", "HostFrame", "OUTPUT_STEP_NAMES",
+    "OverwrittenError", "Pose", "ProtocolError", "ReceiveCounters", "ReceivedFrame", "RefusedError", "Security",
+    "ServerInfo", "Status", "StatusCode", "StreamTerms", "attitude", "crc32c", "parse_frame_header"
 ]

@@ -12,7 +12,7 @@ from .errors import ProtocolError
 FRAME_HEADER_BYTES = 320
 _MAGIC = 0x524D4645
 _VERSION = 1
-_LAYOUT = struct.Struct("<I4BHHIIffIfIIIQQQQ10qQ3d4dBB6xqqQffIIIIIIBB2xfffq4xI")
+_LAYOUT = struct.Struct("<I4BHHIIffIfIIIQQQQ10qQ3d4dBBBxfqqQffIIIIIIBB2xfffqfI")
 assert _LAYOUT.size == FRAME_HEADER_BYTES
 
 FLAG_NAMES = (
@@ -22,11 +22,14 @@ FLAG_BITS = {name: 1 << bit for bit, name in enumerate(FLAG_NAMES)}
 # Only a receiver may set these flags. It clears them where a sender set them.
 RECEIVER_FLAG_BITS = FLAG_BITS["partial"] | FLAG_BITS["corrupt"] | FLAG_BITS["lost_before"]
 
-_QUANTITIES = {1: "radiance_w_m2_sr", 2: "temperature_k"}
+_QUANTITIES = {1: "radiance_w_m2_sr", 2: "temperature_k", 3: "drive"}
 _CHANNEL_KINDS = {0: "injection", 1: "projector"}
 _MOTION_STATES = ("none", "waiting", "parked", "parking", "capturing", "following", "fault")
 _MOTION_FAULTS = ("no_feedback", "no_host", "interlock", "limit", "lock", "clock", "controller_clock", "ignored")
 _ENCODINGS = {0: "raw", 1: "shuffled_lz4"}
+# What was done to the pixels after they were cut out of the sensor's image, by bit of `output_step_bits`.
+OUTPUT_STEP_NAMES = ("mirrored_horizontally", "mirrored_vertically", "rotated_90", "rotated_180", "distorted",
+                     "shifted", "corrected", "driven")
 
 
 @functools.lru_cache(maxsize=256)
@@ -42,7 +45,7 @@ class FrameHeader:
     Wall instants are ns of TAI (UTC with the flag time_unset); 0 means that the event did not happen.
     """
 
-    quantity: str  # "radiance_w_m2_sr" or "temperature_k"
+    quantity: str  # "radiance_w_m2_sr", "temperature_k" or "drive"
     channel_kind: str  # "injection" or "projector"
     channel_index: int
     width_px: int
@@ -86,10 +89,18 @@ class FrameHeader:
     encoded_bytes: int
     motion_state: str  # of the motion simulator; "none": the daemon drives none
     motion_fault_bits: int
-    shift_x_px: float  # projector: the shift that brings the image to where the axes are
+    shift_x_px: float  # projector: the shift that remains to bring the image to where the axes are
     shift_y_px: float
     pointing_error_px: float  # projector: of an earlier frame; NaN: not known
     display_ns: int
+    output_step_bits: int  # what was done to the pixels; OUTPUT_STEP_NAMES has the names of the bits
+    applied_shift_x_px: float  # with the step "shifted": the shift that the daemon has applied to the pixels
+    applied_shift_y_px: float
+
+    @property
+    def output_steps(self) -> frozenset[str]:
+        """Names of what was done to the pixels after they were cut out of the sensor's image."""
+        return frozenset(name for bit, name in enumerate(OUTPUT_STEP_NAMES) if self.output_step_bits >> bit & 1)
 
     @property
     def motion_faults(self) -> frozenset[str]:
@@ -133,13 +144,13 @@ def parse_frame_header(raw: bytes) -> FrameHeader:
         raise ProtocolError(f"frame header: unknown pixel quantity {quantity}")
     position = fields[31:34]
     quaternion = fields[34:38]
-    quality_level, encoding = fields[38:40]
+    quality_level, encoding, output_steps, applied_x_px = fields[38:42]
     if encoding not in _ENCODINGS:
         raise ProtocolError(f"frame header: unknown pixel encoding {encoding}")
     header = FrameHeader(
         _QUANTITIES[quantity], _CHANNEL_KINDS.get(channel_kind, f"kind_{channel_kind}"), *fields[6:11],
         fields[11] & ~RECEIVER_FLAG_BITS, *fields[12:31], position, quaternion, quality_level, _ENCODINGS[encoding],
-        *fields[40:-7], _motion_state(fields[-7]), *fields[-6:-1])
+        *fields[42:-8], _motion_state(fields[-8]), *fields[-7:-2], output_steps, applied_x_px, fields[-2])
     if header.payload_bytes != 4 * header.width_px * header.height_px:
         raise ProtocolError(f"frame header: {header.payload_bytes} payload bytes for {header.width_px}x"
                             f"{header.height_px} float32 pixels")

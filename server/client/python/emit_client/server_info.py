@@ -72,6 +72,27 @@ class Channel:
     sensor_height_px: int
     # Pairs of wavelength (um) and relative response. Empty: a perfect rectangle. None: the daemon does not say.
     response: tuple[tuple[float, float], ...] | None
+    window_width_px: int  # size of the part of the sensor's image that the frames show
+    window_height_px: int
+    output_step_bits: int  # what is done to the pixels, as in FrameHeader
+
+    def sensor_point(self, x_px: float, y_px: float) -> tuple[float, float] | None:
+        """Returns the place in the sensor's image that a place of a frame shows.
+
+        Both count in px from the top left corner; pixel (0, 0) has its centre at (0.5, 0.5). None: only the distortion
+        map of the channel knows. A shift that the daemon has applied (FrameHeader.applied_shift_x_px) is not part of
+        it: subtract it from the result.
+        """
+        if self.output_step_bits & 16:
+            return None
+        w, h = self.window_width_px, self.window_height_px
+        quarter_turns = self.output_step_bits >> 2 & 3  # clockwise
+        x, y = ((x_px, y_px), (y_px, h - x_px), (w - x_px, h - y_px), (w - y_px, x_px))[quarter_turns]
+        if self.output_step_bits & 1:
+            x = w - x
+        if self.output_step_bits & 2:
+            y = h - y
+        return self.window_x_px + x, self.window_y_px + y
 
     @property
     def frame_bytes(self) -> int:
@@ -86,7 +107,8 @@ class Channel:
             response = tuple(zip(info.response_um, info.response_frac))
         return Channel(info.index, info.name, info.kind, info.sensor, info.band, info.band_lo_um, info.band_hi_um,
                        info.width_px, info.height_px, max(info.every_nth, 1), info.window_x_px, info.window_y_px,
-                       info.sensor_width_px, info.sensor_height_px, response)
+                       info.sensor_width_px, info.sensor_height_px, response, info.window_width_px or info.width_px,
+                       info.window_height_px or info.height_px, info.output_steps)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -38,6 +38,7 @@ struct LoopOptions {
   double noise_arcsec = 0.0;
   bool projects = true;
   std::int64_t display_delay_ns = 10 * kMs;
+  bool applies_shift = false;  ///< a second channel shows a window, moved by the shift
 };
 
 config::DaemonConfig daemon_config(const LoopOptions& options, std::uint16_t port) {
@@ -123,6 +124,7 @@ class Loop {
     EXPECT_TRUE(port.has_value());
     auto follower = TableFollower::create(plan_.follower);
     EXPECT_TRUE(follower.has_value());
+    if (options.applies_shift) apply_shift();
     agent_.emplace(rig_.context(), std::move(*port), std::move(*follower), kMs);
     EXPECT_TRUE(agent_->on_start());
     TableSimulator::Options simulated;
@@ -205,6 +207,24 @@ class Loop {
     out.rate_hz = 100.0;
     out.display_delay_ns = options.display_delay_ns;
     return out;
+  }
+  /// Channels: the whole image of 8 x 4, and a window of it that shifts.
+  void apply_shift() {
+    scene::ScenarioDesc scenario;
+    scenario.bands = {{"8-12", 8.0, 12.0, {}}};
+    scenario.channels.resize(2);
+    for (scene::ChannelDesc& channel : scenario.channels) {
+      channel.band = "8-12";
+      channel.kind = scene::ChannelKind::projector;
+    }
+    scenario.channels[1].window_px = {2, 1, 4, 2};
+    scenario.channels[1].output.apply_shift = true;
+    auto table = make_channels(scenario, *rig_.render().source_info());
+    ASSERT_TRUE(table.has_value()) << table.error().text;
+    rig_.context().channels = std::move(table->channels);
+    rig_.context().pictures = std::move(table->pictures);
+    rig_.context().shifts_pictures = true;
+    rig_.render().shift_by(plan_);
   }
   void send_pose() {
     const glm::dquat seeker = seeker_at(sim_ns());
@@ -442,6 +462,76 @@ TEST(MotionLoop, a_repeated_frame_is_shown_in_its_own_slot) {
   ASSERT_NE(repeated.flags & protocol::kFlagRepeated, 0U);
   EXPECT_EQ(repeated.display_ns, repeated.slot_begin_ns + 10 * kMs);
   EXPECT_EQ(repeated.motion_state, MotionState::following);
+}
+
+TEST(MotionLoop, a_picture_is_moved_by_the_shift_that_its_header_has) {
+  LoopOptions options;
+  options.noise_arcsec = 1.0;
+  options.applies_shift = true;
+  Loop loop(options);
+  loop.run(10 * kSecondNs + 8 * kMs);
+  const std::size_t from = loop.rig().frames.size();
+  loop.monitors.clear();
+  const std::uint64_t unknown = loop.rig().count(Counter::output_shifts_unknown);
+  double largest_px = 0.0;
+  for (int i = 0; i < 300; ++i) {
+    // A slot begins after 2 ms. Its pixels come 6 ms later; the axes are measured anew meanwhile.
+    loop.rig().script.ready = false;
+    loop.run(8 * kMs);
+    loop.rig().script.ready = true;
+    loop.run(2 * kMs);
+    const PublishFrame& frame = loop.rig().frames.back();
+    const glm::vec2 shift_px = frame.image.shift_px;
+    ASSERT_EQ(frame.header.shift_x_px, shift_px.x);
+    ASSERT_EQ(frame.header.shift_y_px, shift_px.y);
+    largest_px = std::max<double>(largest_px, glm::length(shift_px));
+    // The scripted image rises by 1 a column and by 8 a row, so that a moved one is known exactly.
+    for (std::uint32_t y = 0; y < 2; ++y) {
+      for (std::uint32_t x = 0; x < 4; ++x) {
+        ASSERT_NEAR(frame.image.pictures[1][y * 4 + x],
+                    frame.image.pictures[0][(1 + y) * 8 + 2 + x] - shift_px.x - 8.0F * shift_px.y,
+                    2e-3);
+      }
+    }
+    ASSERT_EQ(frame.image.crc32c[1], protocol::crc32c(std::as_bytes(frame.image.pictures[1])));
+  }
+  EXPECT_GT(largest_px, 0.01) << "the axes do lag";
+  const Pointing pointing = pointing_of(loop, from, {0.0, 0.0});
+  EXPECT_GE(pointing.frames, 290);
+  EXPECT_LT(pointing.rms_px, 0.1) << "the header has the shift that was applied";
+  EXPECT_EQ(loop.rig().count(Counter::output_shifts_unknown), unknown);
+  EXPECT_EQ(loop.rig().count(Counter::shift_feedback_dropped), 0U);
+}
+
+TEST(MotionLoop, a_picture_rests_and_is_flagged_while_the_axes_are_not_known) {
+  LoopOptions options;
+  options.applies_shift = true;
+  Loop loop(options);
+  loop.run(8 * kSecondNs);
+  ASSERT_EQ(loop.rig().frames.back().header.flags & protocol::kFlagMotionFault, 0U);
+  loop.controller_answers = false;
+  loop.run(200 * kMs);
+  const PublishFrame& frame = loop.rig().frames.back();
+  EXPECT_EQ(frame.image.shift_px, glm::vec2(0.0F));
+  EXPECT_EQ(frame.header.shift_x_px, 0.0F);
+  EXPECT_NE(frame.header.flags & protocol::kFlagMotionFault, 0U);
+  EXPECT_NE(frame.header.motion_faults & protocol::kMotionNoFeedback, 0);
+  EXPECT_GT(loop.rig().count(Counter::output_shifts_unknown), 0U);
+  EXPECT_EQ(frame.image.pictures[1][0], frame.image.pictures[0][8 + 2]);
+}
+
+TEST(MotionLoop, a_repeated_frame_says_what_remains_of_the_shift) {
+  LoopOptions options;
+  options.applies_shift = true;
+  Loop loop(options);
+  loop.run(8 * kSecondNs);
+  const PublishFrame newest = loop.rig().frames.back();
+  loop.rig().script.ready = false;
+  loop.run(50 * kMs);
+  const PublishFrame& repeated = loop.rig().frames.back();
+  ASSERT_TRUE(repeated.repeat);
+  // The axes have turned by half a degree since, 56 arcsec a pixel.
+  EXPECT_GT(std::abs(repeated.header.shift_x_px - newest.image.shift_px.x), 1.0F);
 }
 
 TEST(MotionLoop, a_target_that_the_scenario_lacks_is_refused) {

@@ -33,8 +33,7 @@ TEST(Channels, ShareAPictureOnlyWithTheSameBandAndWindow) {
   EXPECT_EQ(table.pictures[table.channels[1].picture].channels, 0b1010U);
   EXPECT_EQ(table.channels[1].width_px, 3U);
   EXPECT_EQ(table.channels[1].height_px, 2U);
-  EXPECT_EQ(table.channels[1].window_x_px, 2U);
-  EXPECT_EQ(table.channels[1].window_y_px, 1U);
+  EXPECT_EQ(table.channels[1].window_px, (scene::PixelRect{2, 1, 3, 2}));
   EXPECT_EQ(table.channels[1].sensor_width_px, kWidthPx);
   EXPECT_EQ(table.channels[1].sensor_height_px, kHeightPx);
   EXPECT_TRUE(table.pictures[2].copies.empty()) << "whole rows need no copy";

@@ -73,6 +73,7 @@ void set_frame_metadata(ExrImage& image, const FrameMetadata& metadata);
 /// Names of the channels of a frame. They are a contract with the readers of the files.
 inline constexpr char kRadianceChannel[] = "radiance";        ///< W m-2 sr-1 in the band
 inline constexpr char kTemperatureChannel[] = "temperature";  ///< K; NaN in the sky
+inline constexpr char kDriveChannel[] = "drive";              ///< command of a projector's emitter
 inline constexpr char kDepthChannel[] = "depth";    ///< m along the boresight; +Inf in the sky
 inline constexpr char kObjectChannel[] = "object";  ///< object id; 0 in the sky
 inline constexpr char kValidChannel[] =

@@ -10,6 +10,7 @@
 #include "emit/physics/atmosphere_table.hpp"
 #include "emit/physics/frames.hpp"
 #include "emit/physics/weather.hpp"
+#include "emit/scene/channel_output.hpp"
 
 /// Plain description of a scenario. `config` fills it from files, `renderer` and `reference` read
 /// it; it holds no loaded geometry and no GPU or parser types. All values SI, angles in radians.
@@ -152,6 +153,7 @@ struct ChannelDesc {
   std::string band;             ///< name of a SpectralBand
   PixelRect window_px = {};     ///< part of the sensor's image; empty: all of it
   std::uint32_t every_nth = 1;  ///< shows frames 1, 1 + n, 1 + 2 n, ... of every run
+  ChannelOutput output = {};    ///< what is done to its picture
 };
 
 using physics::ClearSky;

@@ -13,6 +13,7 @@
 #include "emit/protocol/control.hpp"
 #include "emit/protocol/frame_header.hpp"
 #include "emit/protocol/host_frame.hpp"
+#include "emit/protocol/output_geometry.hpp"
 #include "emit/protocol/parity.hpp"
 #include "emit/protocol/reassembler.hpp"
 
@@ -65,7 +66,16 @@ struct ChannelDescription {
   std::uint32_t window_y_px = 0;
   std::uint32_t sensor_width_px = 0;  ///< 0: the daemon does not say
   std::uint32_t sensor_height_px = 0;
+  std::uint32_t window_width_px = 0;  ///< size of that part of the sensor's image
+  std::uint32_t window_height_px = 0;
+  std::uint8_t output_steps = 0;  ///< protocol::OutputSteps: what is done to its pixels
 
+  /// Returns the place in the sensor's image that a place of a frame shows. Both count in px from
+  /// the top left corner, and pixel (0, 0) has its centre at (0.5, 0.5). Absent where only the
+  /// distortion map of the channel knows. A shift that emitd has applied (FrameHeader::
+  /// applied_shift_*_px) is not part of it: subtract it from the result.
+  [[nodiscard]] std::optional<protocol::ImagePoint> sensor_point(
+      const protocol::ImagePoint& frame_point) const noexcept;
   /// Returns the band with which radiances are converted: a rectangle where the response is not
   /// known. Absent for a channel without a band, or with one that makes no sense.
   [[nodiscard]] std::optional<physics::Band> spectral_band() const;

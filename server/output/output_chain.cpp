@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "output/output_chain.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "emit/physics/check.hpp"
+
+namespace emit::server {
+
+using physics::ErrorCode;
+using physics::make_error;
+using physics::Result;
+using protocol::ImagePoint;
+using protocol::ImageSize;
+
+namespace {
+
+/// Rows that pass through all steps together, so that they stay in the cache. A picture that was
+/// turned by 90 degrees reads as many neighbours of a row in memory.
+constexpr std::uint32_t kRowsAtOnce = 16;
+
+std::uint8_t steps_of(const scene::ChannelOutput& settings) noexcept {
+  using protocol::OutputSteps;
+  using scene::PictureMirror;
+  const auto if_so = [](bool so, OutputSteps step) {
+    return so ? static_cast<std::uint8_t>(step) : std::uint8_t{0};
+  };
+  const PictureMirror mirror = settings.mirror;
+  const bool both = mirror == PictureMirror::both;
+  const bool distorted = !settings.distortion_file.empty() || settings.has_polynomial();
+  return static_cast<std::uint8_t>(
+      if_so(both || mirror == PictureMirror::horizontal, protocol::kOutputMirroredHorizontally) |
+      if_so(both || mirror == PictureMirror::vertical, protocol::kOutputMirroredVertically) |
+      if_so(settings.rotate_deg % 180 == 90, protocol::kOutputRotated90) |
+      if_so(settings.rotate_deg >= 180, protocol::kOutputRotated180) |
+      if_so(distorted, protocol::kOutputDistorted) |
+      if_so(settings.apply_shift, protocol::kOutputShifted) |
+      if_so(!settings.nuc_file.empty(), protocol::kOutputCorrected) |
+      if_so(!settings.drive_table_file.empty(), protocol::kOutputDriven));
+}
+
+/// Returns a window with a margin on all sides, as far as the image has it.
+scene::PixelRect grown(const scene::PixelRect& window, std::uint32_t margin_px,
+                       const ImageSize& image) noexcept {
+  const std::uint32_t left = std::min(window.x_px, margin_px);
+  const std::uint32_t top = std::min(window.y_px, margin_px);
+  const std::uint32_t right = std::min(image.width_px - window.x_px - window.width_px, margin_px);
+  const std::uint32_t bottom =
+      std::min(image.height_px - window.y_px - window.height_px, margin_px);
+  return {window.x_px - left, window.y_px - top, window.width_px + left + right,
+          window.height_px + top + bottom};
+}
+
+Result<PositionMap::Source> positions_of(const scene::ChannelOutput& settings,
+                                         const ImageSize& picture, double focal_px) {
+  if (!settings.distortion_file.empty()) {
+    auto read = PositionMap::read(settings.distortion_file, picture);
+    if (!read) return tl::unexpected(std::move(read.error()).with_context("distortion_file"));
+    return read;
+  }
+  if (!settings.has_polynomial()) return PositionMap::identity(picture);
+  if (!(focal_px > 0.0)) {
+    return make_error(ErrorCode::config,
+                      "a distortion polynomial needs the sensor's field of view");
+  }
+  return PositionMap::brown(picture, focal_px, settings.distortion_radial,
+                            settings.distortion_tangential);
+}
+
+}  // namespace
+
+Result<OutputChain> OutputChain::make(const scene::ChannelOutput& settings, const Origin& origin) {
+  const scene::PixelRect& window_px = origin.window_px;
+  const ImageSize window{window_px.width_px, window_px.height_px};
+  OutputChain out;
+  out.steps_ = steps_of(settings);
+  out.source_px_ = window_px;
+  out.frame_ = protocol::turned_size(out.steps_, window);
+  if ((out.steps_ & (protocol::kOutputDistorted | protocol::kOutputShifted)) != 0) {
+    out.source_px_ =
+        grown(window_px, settings.apply_shift ? kShiftMarginPx : kSampleMarginPx, origin.image);
+    const SampledPart part{
+        std::size_t{out.source_px_.y_px} * origin.image.width_px + out.source_px_.x_px,
+        origin.image.width_px,
+        {out.source_px_.width_px, out.source_px_.height_px}};
+    auto source = positions_of(settings, out.frame_, origin.focal_px);
+    if (!source) return tl::unexpected(std::move(source.error()));
+    const ImagePoint window_at{static_cast<double>(window_px.x_px - out.source_px_.x_px),
+                               static_cast<double>(window_px.y_px - out.source_px_.y_px)};
+    out.map_.emplace(*source, out.steps_, window, window_at, part,
+                     static_cast<float>(settings.outside_w_m2_sr));
+    out.frame_ = out.map_->frame();
+    if (out.map_->outside_px() == source->points.size()) {
+      return make_error(ErrorCode::config, "the distortion polynomial points nowhere");
+    }
+  } else {
+    const auto index_of = [&](double x_px, double y_px) {
+      const ImagePoint at = protocol::window_point(out.steps_, window, {x_px + 0.5, y_px + 0.5});
+      return (static_cast<std::ptrdiff_t>(std::floor(at.y_px)) + window_px.y_px) *
+                 static_cast<std::ptrdiff_t>(origin.image.width_px) +
+             static_cast<std::ptrdiff_t>(std::floor(at.x_px)) + window_px.x_px;
+    };
+    out.turn_first_ = index_of(0, 0);
+    out.turn_right_ = index_of(1, 0) - out.turn_first_;
+    out.turn_down_ = index_of(0, 1) - out.turn_first_;
+  }
+  if (!settings.nuc_file.empty()) {
+    auto gain = PixelGain::read(settings.nuc_file, out.frame_);
+    if (!gain) return tl::unexpected(std::move(gain.error()).with_context("nuc_file"));
+    out.gain_ = std::move(*gain);
+  }
+  if (!settings.drive_table_file.empty()) {
+    auto table = DriveTable::read(settings.drive_table_file);
+    if (!table) return tl::unexpected(std::move(table.error()).with_context("drive_table_file"));
+    out.table_ = std::move(*table);
+  }
+  return out;
+}
+
+void OutputChain::turn_rows(std::span<const float> image, std::uint32_t first, std::uint32_t end,
+                            std::span<float> out) const noexcept {
+  const float* const source = image.data() + turn_first_;
+  const std::size_t width = frame_.width_px;
+  if (!protocol::exchanges_sides(steps_)) {
+    for (std::size_t row = first; row < end; ++row) {
+      const float* from = source + static_cast<std::ptrdiff_t>(row) * turn_down_;
+      float* const line = out.data() + row * width;
+      if (turn_right_ == 1) {
+        std::copy_n(from, width, line);
+      } else {
+        std::reverse_copy(from - (width - 1), from + 1, line);
+      }
+    }
+    return;
+  }
+  // Neighbours in a column of the frame are neighbours in memory.
+  for (std::size_t column = 0; column < width; ++column) {
+    const float* from = source + static_cast<std::ptrdiff_t>(column) * turn_right_ +
+                        static_cast<std::ptrdiff_t>(first) * turn_down_;
+    for (std::size_t row = first; row < end; ++row, from += turn_down_) {
+      out[row * width + column] = *from;
+    }
+  }
+}
+
+std::uint32_t OutputChain::apply(std::span<const float> image, const glm::vec2& shift_px,
+                                 std::span<float> out) const noexcept {
+  const std::size_t width = frame_.width_px;
+  EMIT_DCHECK_OP(out.size(), ==, width * frame_.height_px);
+  const glm::vec2 moved_px = (steps_ & protocol::kOutputShifted) != 0 ? shift_px : glm::vec2(0.0F);
+  std::uint32_t clamped = 0;
+  for (std::uint32_t first = 0; first < frame_.height_px; first += kRowsAtOnce) {
+    const std::uint32_t end = std::min(first + kRowsAtOnce, frame_.height_px);
+    if (!map_) turn_rows(image, first, end, out);
+    for (std::uint32_t row = first; row < end; ++row) {
+      const std::span<float> line = out.subspan(row * width, width);
+      if (map_) map_->sample_line(image, moved_px, row, line);
+      if (gain_) gain_->apply_line(row, line);
+      if (table_) clamped += table_->apply(line);
+    }
+  }
+  return clamped;
+}
+
+}  // namespace emit::server
