@@ -59,6 +59,7 @@ server/pacing: protocol renderer/include renderer/physics renderer/scene
 server/motion: protocol renderer/physics
 server/gnss: protocol renderer/physics
 server/output: protocol renderer/image renderer/physics renderer/scene
+server/engage: protocol renderer/physics
 server/telemetry: server/host server/net server/rt config/include protocol renderer/physics
 server/gateway: server/host server/motion server/net server/rt server/telemetry config/include protocol renderer/physics renderer/reference renderer/scene
 server/agents: server/gateway server/host server/motion server/output server/pacing server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
@@ -74,11 +75,12 @@ server/tool/support: server/app server/pacing server/telemetry config/include pr
 server/tool/command_line: server/tool/support config/include renderer/physics
 server/tool/streams: server/tool/command_line server/tool/support server/app server/client server/rt protocol renderer/image renderer/physics renderer/scene
 server/tool/view: server/tool/support server/tool/streams server/client renderer/image renderer/include renderer/physics
+server/tool/engage: server/tool/command_line server/tool/support server/tool/streams server/client server/engage config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
 server/bench/stability: server/tool/command_line server/tool/support renderer/image renderer/include renderer/physics renderer/scene renderer/verify
 server/bench/accuracy: server/tool/command_line server/tool/support server/bench/stability renderer/image renderer/include renderer/physics renderer/reference renderer/scene renderer/threads renderer/verify
 server/bench/frame_time: server/tool/command_line server/tool/support server/bench/accuracy server/bench/stability server/pacing renderer/include renderer/physics renderer/reference renderer/scene renderer/scene/generate
 server/bench/stream: server/tool/command_line server/tool/support server/tool/streams server/agents server/client server/net server/output server/rt config/include protocol renderer/image renderer/physics renderer/scene
-server/tool/commands: server/tool/command_line server/tool/support server/tool/streams server/tool/view server/gnss server/motion server/agents/render server/app server/client server/net server/rt config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
+server/tool/commands: server/tool/command_line server/tool/engage server/tool/support server/tool/streams server/tool/view server/gnss server/motion server/agents/render server/app server/client server/net server/rt config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
 server/tool/lab: server/tool/command_line server/tool/support server/tool/commands server/bench/accuracy server/bench/frame_time server/bench/stability server/bench/stream config/include renderer/image renderer/physics renderer/reference renderer/scene renderer/verify
 server/tool: server/tool/commands server/tool/lab server/tool/support
 '

@@ -6,6 +6,7 @@ set(python_files)
 set(python_sources
   emit_client/__init__.py
   emit_client/control.py
+  emit_client/correlation.py
   emit_client/crc32c.py
   emit_client/deadline.py
   emit_client/errors.py
@@ -14,15 +15,18 @@ set(python_sources
   emit_client/frames.py
   emit_client/host_client.py
   emit_client/host_frames.py
+  emit_client/hot_spot.py
   emit_client/messages.py
   emit_client/reassembler.py
   emit_client/resend_planner.py
   emit_client/security.py
+  emit_client/seeker.py
   emit_client/server_info.py
   emit_client/session_host.py
   emit_client/shm_frame_client.py
   emit_client/socket_frame_client.py
   emit_client/tcp_frame_client.py
+  emit_client/tracker_study.py
   emit_client/udp_frame_client.py
   emit_client/url.py
   examples/receive_frames.py

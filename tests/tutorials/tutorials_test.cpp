@@ -63,6 +63,14 @@ TEST(Tutorials, Rig) {
   run_shell_snippets("rig.md");
 }
 
+TEST(Tutorials, Engage) {
+  const ScratchFolder folder;
+  if (run(folder, "/usr/bin/python3 -c 'import numpy, google.protobuf'") != 0) {
+    GTEST_SKIP() << "python3-numpy or python3-protobuf is missing";
+  }
+  run_shell_snippets("engage.md");
+}
+
 /// Manual pages and completion scripts lie where man(1) and the shells look for them.
 TEST(Installation, HasManualPagesAndCompletion) {
   const ScratchFolder folder;

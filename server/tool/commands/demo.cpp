@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
-#include <stdlib.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -23,6 +21,7 @@
 #include "tool/support/interrupt.hpp"
 #include "tool/support/progress.hpp"
 #include "tool/support/scenario_input.hpp"
+#include "tool/support/work_folder.hpp"
 
 namespace emit::tool {
 namespace {
@@ -46,37 +45,6 @@ using physics::Result;
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
-
-/// Work folder for configuration, journal and log, under a name that nothing had before; removed at
-/// the end unless it is to be kept.
-class WorkFolder {
- public:
-  explicit WorkFolder(bool keep) : keep_(keep) {}
-  ~WorkFolder() {
-    std::error_code ignored;
-    if (!keep_ && !path_.empty()) std::filesystem::remove_all(path_, ignored);
-  }
-  WorkFolder(const WorkFolder&) = delete;
-  WorkFolder& operator=(const WorkFolder&) = delete;
-  /// Makes `parent`/run-XXXXXX. Errors: io.
-  Result<void> create(const std::filesystem::path& parent) {
-    std::string name = (parent / "run-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) {
-      return make_error(ErrorCode::io,
-                        fmt::format("{}: cannot create the work folder: {}", parent.string(),
-                                    std::generic_category().message(errno)));
-    }
-    path_ = name;
-    return {};
-  }
-  void keep() noexcept { keep_ = true; }
-  [[nodiscard]] bool kept() const noexcept { return keep_ && !path_.empty(); }
-  [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
-
- private:
-  std::filesystem::path path_;
-  bool keep_;
-};
 
 /// The shipped log of a scenario, or one made from the scenario's trajectories where none ships.
 Result<std::filesystem::path> find_or_make_log(const DemoOptions& command,

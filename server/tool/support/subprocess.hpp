@@ -12,14 +12,16 @@
 
 namespace emit::tool {
 
-/// A child process whose standard output and error go to a file. Single thread, setup only.
+/// A child process whose standard error goes to a file, and its standard output to the same file or
+/// to a pipe. Single thread, setup only.
 /// The destructor kills and reaps a child that still runs.
 class Subprocess {
  public:
-  /// Starts a program. `log` receives both output streams. Errors: not_found (no such executable),
-  /// io.
+  /// Starts a program. `log` receives both output streams; with an `output_fd` of 0 or more,
+  /// standard output goes there. Errors: not_found (no such executable), io.
   [[nodiscard]] static physics::Result<Subprocess> start(const std::vector<std::string>& arguments,
-                                                         const std::filesystem::path& log);
+                                                         const std::filesystem::path& log,
+                                                         int output_fd = -1);
   Subprocess(Subprocess&& other) noexcept;
   Subprocess& operator=(Subprocess&&) = delete;
   Subprocess(const Subprocess&) = delete;

@@ -48,6 +48,7 @@ const std::vector<OutputCase>& output_cases() {
     add({"solve", "box", "--time-s", "3600", "--out", "GOOD"}, {"--out", "--png", "--json"},
         {"--checkpoint"});
     add({"demo", "--out", "GOOD"}, {"--json"}, {"--out"});
+    add({"engage", "--out", "GOOD"}, {"--json"}, {"--out"});
     add({"receive", "tcp://127.0.0.1:1"}, {"--json"}, {"--out"});
     add({"record", "--from", "tcp://127.0.0.1:1", "--out", "GOOD"}, {"--out", "--json"});
     add({"replay", "no.mcap", "--scenario", "box"}, {"--json"}, {"--out"});

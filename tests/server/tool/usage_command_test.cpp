@@ -20,7 +20,7 @@ TEST_P(CliHelp, every_command_explains_itself_with_an_example) {
 }
 INSTANTIATE_TEST_SUITE_P(Commands, CliHelp,
                          testing::Values("render", "receive", "send", "stat", "record", "replay",
-                                         "demo", "view", "compare", "inspect", "evaluate",
+                                         "demo", "engage", "view", "compare", "inspect", "evaluate",
                                          "generate", "log", "make-log", "bench", "latency",
                                          "trigger", "trace", "solve", "fit", "fms-sim", "man",
                                          "export"));
