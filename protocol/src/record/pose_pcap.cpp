@@ -3,63 +3,27 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <vector>
+#include <utility>
 
-#include "captured_datagram.hpp"
 #include "emit/protocol/codec.hpp"
-#include "pcap_file.hpp"
+#include "emit/protocol/record/capture_reader.hpp"
 #include "quiet_protobuf.hpp"
 
 namespace emit::protocol {
 
-using physics::Error;
-using physics::ErrorCode;
 using physics::Result;
 
 struct PosePcapReader::Impl {
-  Impl(std::filesystem::path file, PcapFile reader, std::uint16_t udp_port)
+  Impl(std::filesystem::path file, CaptureReader reader, std::uint16_t udp_port)
       : path(std::move(file)), capture(std::move(reader)), port(udp_port) {}
 
   std::filesystem::path path;
-  PcapFile capture;
+  CaptureReader capture;
   std::uint16_t port;
   HostFrameDecoder decoder;
   HostFrameData host;
-  std::vector<std::byte> last;  // payload of the newest datagram to the port
-  std::uint64_t frames = 0;
-  std::uint64_t repeated = 0;
   std::uint64_t refused = 0;
   std::string first_refusal;
-  std::uint64_t later_fragments = 0;
-  std::uint64_t unread = 0;  // packets of network layers that are not handled
-  std::string first_unread;
-  std::optional<Error> failure;
-
-  tl::unexpected<Error> fail(ErrorCode code, std::string_view text) {
-    failure =
-        Error{code, fmt::format("{}: packet {}: {}", path.string(), capture.packet().number, text)};
-    return tl::unexpected(*failure);
-  }
-
-  /// Takes a datagram. Returns true when it is a new host frame.
-  bool take(std::span<const std::byte> payload) {
-    // Captures on the "any" interface hold local datagrams twice.
-    if (!last.empty() && std::ranges::equal(payload, last)) {
-      ++repeated;
-      return false;
-    }
-    last.assign(payload.begin(), payload.end());
-    const DecodeStatus status = decode_host_frame(payload, decoder, host);
-    if (status == DecodeStatus::ok) {
-      ++frames;
-      return true;
-    }
-    if (++refused == 1) {
-      first_refusal = fmt::format("packet {}: {}", capture.packet().number, to_string(status));
-    }
-    return false;
-  }
 };
 
 PosePcapReader::PosePcapReader(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -68,53 +32,28 @@ PosePcapReader& PosePcapReader::operator=(PosePcapReader&&) noexcept = default;
 PosePcapReader::~PosePcapReader() = default;
 
 bool PosePcapReader::is_capture(const std::filesystem::path& path) {
-  return PcapFile::is_capture(path);
+  return CaptureReader::is_capture(path);
 }
 
 Result<PosePcapReader> PosePcapReader::open(const std::filesystem::path& path,
                                             std::uint16_t udp_port) {
   quiet_protobuf();
-  auto capture = PcapFile::open(path);
+  auto capture = CaptureReader::open(path, udp_port);
   if (!capture) return tl::unexpected(capture.error());
   return PosePcapReader(std::make_unique<Impl>(path, std::move(*capture), udp_port));
 }
 
 Result<bool> PosePcapReader::next() {
-  using Kind = CapturedDatagram::Kind;
-  if (impl_->failure) return tl::unexpected(*impl_->failure);
   for (;;) {
     const auto more = impl_->capture.next();
     if (!more || !*more) return more;
-    const CapturedPacket& packet = impl_->capture.packet();
-    const CapturedDatagram found = find_datagram(packet);
-    if (found.kind == Kind::unknown_link_layer) {
-      return impl_->fail(ErrorCode::unsupported,
-                         fmt::format("link type {} is not handled: Ethernet, Linux cooked, "
-                                     "loopback and raw IP are",
-                                     packet.link_type));
+    const DecodeStatus status =
+        decode_host_frame(impl_->capture.payload(), impl_->decoder, impl_->host);
+    if (status == DecodeStatus::ok) return true;
+    if (++impl_->refused == 1) {
+      impl_->first_refusal =
+          fmt::format("packet {}: {}", impl_->capture.packet(), to_string(status));
     }
-    if (found.kind == Kind::later_fragment) ++impl_->later_fragments;
-    if (found.kind == Kind::unknown_network && ++impl_->unread == 1) {
-      impl_->first_unread =
-          fmt::format("packet {}: Ethernet type 0x{:04x}", packet.number, found.ether_type);
-    }
-    if (found.kind == Kind::none || found.kind == Kind::later_fragment ||
-        found.kind == Kind::unknown_network || found.destination_port != impl_->port)
-      continue;
-    if (found.kind == Kind::fragment) {
-      return impl_->fail(ErrorCode::unsupported,
-                         fmt::format("a datagram to port {} in IP fragments, which are not put "
-                                     "together here: capture where host frames fit the link's MTU "
-                                     "(loopback, jumbo frames)",
-                                     impl_->port));
-    }
-    if (found.kind == Kind::cut) {
-      return impl_->fail(ErrorCode::unsupported,
-                         fmt::format("only {} of {} bytes were captured: capture whole packets "
-                                     "(tcpdump -s 0)",
-                                     packet.data.size(), packet.wire_bytes));
-    }
-    if (impl_->take(found.payload)) return true;
   }
 }
 
@@ -123,32 +62,11 @@ const HostFrameData& PosePcapReader::host() const noexcept {
 }
 
 std::optional<std::string> PosePcapReader::notes() const {
-  std::string out;
-  const auto add = [&out](const std::string& text) { out += (out.empty() ? "" : "; ") + text; };
-  if (impl_->refused > 0) {
-    add(fmt::format("{}: {} datagrams to port {} are no host frames ({})", impl_->path.string(),
-                    impl_->refused, impl_->port, impl_->first_refusal));
-  }
-  if (impl_->repeated > 0) {
-    add(fmt::format("{}: {} datagrams stand there twice and are used once", impl_->path.string(),
-                    impl_->repeated));
-  }
-  if (impl_->frames == 0 && impl_->refused == 0) {
-    add(fmt::format("{}: none of {} packets is a datagram to port {}", impl_->path.string(),
-                    impl_->capture.packet().number, impl_->port));
-  }
-  if (impl_->later_fragments > 0) {
-    add(
-        fmt::format("{}: {} later IP fragments of UDP datagrams, whose port is not known, are left "
-                    "out",
-                    impl_->path.string(), impl_->later_fragments));
-  }
-  if (impl_->unread > 0) {
-    add(fmt::format("{}: {} packets are neither IP nor ARP and are left out ({})",
-                    impl_->path.string(), impl_->unread, impl_->first_unread));
-  }
-  if (impl_->capture.truncation()) add(*impl_->capture.truncation());
-  return out.empty() ? std::nullopt : std::optional(out);
+  const std::optional<std::string> of_capture = impl_->capture.notes();
+  if (impl_->refused == 0) return of_capture;
+  return fmt::format("{}: {} datagrams to port {} are no host frames ({}){}", impl_->path.string(),
+                     impl_->refused, impl_->port, impl_->first_refusal,
+                     of_capture ? "; " + *of_capture : "");
 }
 
 }  // namespace emit::protocol

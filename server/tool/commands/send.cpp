@@ -8,6 +8,8 @@
 #include <thread>
 
 #include "emit/client/client.hpp"
+#include "emit/protocol/record/capture_reader.hpp"
+#include "net/socket.hpp"
 #include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
 #include "tool/streams/pose_log.hpp"
@@ -25,6 +27,7 @@ struct SendOptions {
   std::string control;   ///< with step over UDP: where frames can be watched
   double rate_hz = 0.0;  ///< 0: as recorded
   bool step = false;
+  bool as_captured = false;
   std::uint64_t frames = 0;  ///< 0: all
   std::uint64_t every = 1;
   double timeout_s = 60.0;
@@ -109,9 +112,64 @@ physics::Result<bool> wait_for_frame(client::FrameClient& watcher, client::HostC
   return false;
 }
 
+/// Sends the datagrams of a capture as they are, at the times of the capture or at --rate.
+int send_as_captured(const SendOptions& command, const client::Url& url) {
+  if (url.scheme != client::Url::Scheme::udp || command.step || command.every > 1) {
+    return fail(kExitUsage, "--as-captured sends over udp, without --step and --every");
+  }
+  if (!protocol::CaptureReader::is_capture(command.log)) {
+    return fail(kExitUsage,
+                fmt::format("--as-captured: {} is no pcap or pcapng file", command.log.string()));
+  }
+  auto capture = protocol::CaptureReader::open(command.log, command.host_port);
+  if (!capture) return fail(capture.error());
+  const auto where = server::resolve({url.host, url.port}, server::Transport::udp, false);
+  if (!where) return fail(where.error());
+  const server::SocketContext context;
+  auto socket = server::UdpSocket::open(context, *where);
+  if (!socket) return fail(socket.error());
+
+  const InterruptGuard interrupt;
+  std::uint64_t sent = 0;
+  std::uint64_t failed = 0;
+  std::optional<std::int64_t> first_ns;
+  const auto start = Clock::now();
+  while (!InterruptGuard::interrupted() && (command.frames == 0 || sent < command.frames)) {
+    const auto more = capture->next();
+    if (!more) return fail(more.error());
+    if (!*more) break;
+    if (command.rate_hz > 0.0) {
+      std::this_thread::sleep_until(start +
+                                    std::chrono::nanoseconds(static_cast<std::int64_t>(
+                                        static_cast<double>(sent) * 1e9 / command.rate_hz)));
+    } else {
+      const auto time_ns = capture->time_ns();
+      if (!time_ns) {
+        return fail(kExitUsage, fmt::format("{}: packet {} has no time: give --rate",
+                                            command.log.string(), capture->packet()));
+      }
+      if (!first_ns) first_ns = time_ns;
+      std::this_thread::sleep_until(start + std::chrono::nanoseconds(*time_ns - *first_ns));
+    }
+    const bool done = socket->send_to(capture->payload(), *where).status == server::IoStatus::done;
+    ++(done ? sent : failed);
+  }
+  if (const auto notes = capture->notes()) warn(*notes);
+  const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  fmt::print(text_stream(command.json), "{} datagrams sent in {:.3f} s, {} refused by the system\n",
+             sent, seconds, failed);
+  if (command.json) {
+    Json json = Json::object();
+    json.set("sent", sent).set("seconds", seconds).set("failed", failed);
+    if (auto done = write_json(*command.json, json); !done) return fail(done.error());
+  }
+  return sent > 0 && failed == 0 ? kExitOk : kExitFailure;
+}
+
 int run(const SendOptions& command) {
   const auto url = client::parse_url(command.to);
   if (!url) return fail(kExitUsage, url.error().text);
+  if (command.as_captured) return send_as_captured(command, *url);
   const bool udp = url->scheme == client::Url::Scheme::udp;
   if (command.step && udp && command.control.empty()) {
     return fail(kExitUsage, "--step over udp needs --control tcp://host:port to watch the frames");
@@ -228,6 +286,9 @@ void add_options(CommandLine& line, SendOptions& options) {
       .type_name("PORT")
       .in_range(1, 65535)
       .show_default();
+  line.flag("--as-captured", options.as_captured,
+            "Capture: send the datagrams to --host-port as they are, of any protocol (CIGI, DIS), "
+            "at the times of the capture or at --rate");
   line.option("--run-id", options.run_id,
               "Host run id, not 0; another run in the log counts up. Default: from the clock, "
               "so that a run that follows another needs no reset")
