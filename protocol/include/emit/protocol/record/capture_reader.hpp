@@ -28,9 +28,9 @@ class CaptureReader {
   ~CaptureReader();
 
   /// Moves to the next datagram. Returns false at the end. A datagram that the capture holds twice
-  /// in a row is given once and counted. Errors name file and packet: parse (lengths that contradict
-  /// each other), unsupported (link layer; a datagram in IP fragments or not captured whole). An
-  /// error is final.
+  /// in a row is given once and counted. Errors name file and packet: parse (lengths that
+  /// contradict each other), unsupported (link layer; a datagram in IP fragments or not captured
+  /// whole). An error is final.
   [[nodiscard]] physics::Result<bool> next();
   /// Returns the bytes of the datagram that next() moved to. They are valid until the next call.
   [[nodiscard]] std::span<const std::byte> payload() const noexcept;
@@ -39,8 +39,8 @@ class CaptureReader {
   /// Returns the number of its packet, from 1, as capture tools count.
   [[nodiscard]] std::uint64_t packet() const noexcept;
 
-  /// Returns a text for the user about packets that were left out or are missing at the end; nothing
-  /// when there are none.
+  /// Returns a text for the user about packets that were left out or are missing at the end;
+  /// nothing when there are none.
   [[nodiscard]] std::optional<std::string> notes() const;
 
  private:
