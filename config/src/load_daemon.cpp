@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 
+#include "emit/config/motion_controller.hpp"
 #include "emit/protocol/host_frame.hpp"
 #include "emit/protocol/shared_ring.hpp"
 #include "keys/data_files.hpp"
@@ -59,7 +60,10 @@ void resolve_daemon_scenario(const Node& root, const std::string& text, DaemonCo
 
 /// Checks that the axes of the motion simulator fit its rings.
 void check_motion(const Node& table, const MotionConfig& motion, Diagnostics& diagnostics) {
-  check_endpoint(table, "controller", motion.controller, false, diagnostics);
+  if (const auto controller = parse_motion_controller(motion.controller); !controller) {
+    diagnostics.add(key_location(table, "controller"),
+                    fmt::format("'controller': {}", controller.error().text));
+  }
   const bool has_target = motion.target_rings != TargetRings::none;
   const std::size_t wanted = has_target ? 5 : 3;
   if (motion.axes.size() != wanted) {

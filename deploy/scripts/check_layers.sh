@@ -62,15 +62,16 @@ server/output: protocol renderer/image renderer/physics renderer/scene
 server/engage: protocol renderer/physics
 server/telemetry: server/host server/net server/rt config/include protocol renderer/physics
 server/gateway: server/host server/motion server/net server/rt server/telemetry config/include protocol renderer/physics renderer/reference renderer/scene
+server/axes: server/motion server/net server/rt server/telemetry config/include protocol renderer/physics
 server/agents: server/gateway server/host server/motion server/output server/pacing server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
 server/agents/sender: server/agents server/net server/rt config/include protocol renderer/physics
 server/agents/receiver: server/agents server/agents/sender server/net server/rt config/include protocol renderer/physics
 server/agents/conductor: server/agents server/gateway server/motion server/net server/pacing server/rt config/include protocol renderer/physics
 server/agents/recorder: server/agents server/net server/rt config/include protocol renderer/physics
 server/agents/render: server/agents server/motion server/pacing renderer/image renderer/physics
-server/agents/motion: server/agents server/motion server/net server/rt config/include protocol renderer/physics renderer/scene
+server/agents/motion: server/agents server/axes server/motion server/net server/rt config/include protocol renderer/physics renderer/scene
 server/agents/gateway: server/agents server/gateway server/net server/rt config/include protocol renderer/physics renderer/scene
-server/app: server/host server/agents server/agents/conductor server/agents/gateway server/gateway server/agents/motion server/agents/receiver server/agents/recorder server/agents/render server/agents/sender server/motion server/net server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
+server/app: server/axes server/host server/agents server/agents/conductor server/agents/gateway server/gateway server/agents/motion server/agents/receiver server/agents/recorder server/agents/render server/agents/sender server/motion server/net server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
 server/tool/support: server/app server/pacing server/telemetry config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene renderer/scene/generate
 server/tool/command_line: server/tool/support config/include renderer/physics
 server/tool/streams: server/tool/command_line server/tool/support server/app server/client server/rt protocol renderer/image renderer/physics renderer/scene
@@ -80,7 +81,8 @@ server/bench/stability: server/tool/command_line server/tool/support renderer/im
 server/bench/accuracy: server/tool/command_line server/tool/support server/bench/stability renderer/image renderer/include renderer/physics renderer/reference renderer/scene renderer/threads renderer/verify
 server/bench/frame_time: server/tool/command_line server/tool/support server/bench/accuracy server/bench/stability server/pacing renderer/include renderer/physics renderer/reference renderer/scene renderer/scene/generate
 server/bench/stream: server/tool/command_line server/tool/support server/tool/streams server/agents server/client server/net server/output server/rt config/include protocol renderer/image renderer/physics renderer/scene
-server/tool/commands: server/tool/command_line server/tool/engage server/tool/support server/tool/streams server/tool/view server/gnss server/motion server/agents/render server/app server/client server/net server/rt config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
+server/tool/fms_sim: server/axes server/motion server/net server/tool/support config/include protocol renderer/physics
+server/tool/commands: server/tool/command_line server/tool/engage server/tool/support server/tool/streams server/tool/view server/tool/fms_sim server/gnss server/motion server/agents/render server/app server/client server/net server/rt config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
 server/tool/lab: server/tool/command_line server/tool/support server/tool/commands server/bench/accuracy server/bench/frame_time server/bench/stability server/bench/stream config/include renderer/image renderer/physics renderer/reference renderer/scene renderer/verify
 server/tool: server/tool/commands server/tool/lab server/tool/support
 '

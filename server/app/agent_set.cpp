@@ -9,6 +9,7 @@
 #include "agents/gateway/gateway_setup.hpp"
 #include "agents/motion/motion_setup.hpp"
 #include "app/recording.hpp"
+#include "axes/open_axes_link.hpp"
 #include "emit/physics/check.hpp"
 #include "emit/v1/control.pb.h"
 
@@ -128,15 +129,15 @@ physics::Result<void> AgentSet::make_motion() {
   if (!follower) {
     return named(follower.error());
   }
-  auto port = AxesPort::open(config_.motion.controller, context_.counters);
-  if (!port) {
-    return named(port.error());
+  auto link = open_axes_link(config_.motion, context_.counters, context_.motion_events);
+  if (!link) {
+    return named(link.error());
   }
   motion_plan_ = std::move(*plan);
   if (context_.shifts_pictures) {
     render_->shift_by(*motion_plan_);
   }
-  motion_ = std::make_unique<MotionAgent>(context_, std::move(*port), std::move(*follower),
+  motion_ = std::make_unique<MotionAgent>(context_, std::move(*link), std::move(*follower),
                                           motion_plan_->follower.period_ns);
   return {};
 }

@@ -82,9 +82,12 @@ namespace emit::server {
   X(axes_commands_missed, "commands left out because the motion agent did not run")        \
   X(axes_commands_limited, "commands with an axis at a limit")                             \
   X(axes_send_errors, "commands the kernel refused to send")                               \
+  X(axes_rounds_left_out, "commands left out: its last answers had not come")              \
+  X(axes_connections_lost, "connections to it lost: closed, silent, no order")             \
   X(axes_inputs_dropped, "poses and targets the motion agent did not take in time")        \
   X(axes_reports, "measurements of the motion simulator taken")                            \
   X(axes_reports_refused, "its datagrams refused: malformed, old, wrong number of axes")   \
+  X(axes_torn_reads, "looks at its memory while it wrote: read again later")               \
   X(axes_reports_dropped, "measurements the conductor did not take in time")               \
   X(shift_feedback_dropped, "measurements the render agent did not take in time")          \
   X(output_px_clamped, "pixels beyond the ends of a channel's drive table")                \

@@ -31,6 +31,9 @@ enum class EventKind : std::uint8_t {
   secured,                  ///< a = connection, text = names in the peer's certificate
   host_session,             ///< text = address
   motion_changed,           ///< a = protocol::MotionState, b = protocol::MotionFaults
+  axes_connected,           ///< text = address of the motion simulator's controller
+  axes_lost,                ///< text = why
+  axes_refused,             ///< a = axis, from 1 on, text = answer of the controller
   gateway_mode,             ///< a = protocol::cigi::IgMode
   gateway_time,             ///< a = simulation time that the host has set, ns
   gateway_refused,          ///< text = what, why

@@ -207,6 +207,26 @@ EventText describe_refusal(const Event& event, const std::string& text) {
                                    event.a < kWhy.size() ? kWhy[event.a] : "?", text));
 }
 
+/// Returns the text of an event of the connection to a motion simulator.
+EventText describe_axes(const Event& event, const std::string& text) {
+  switch (event.kind) {
+    case EventKind::axes_connected:
+      return info(fmt::format("event=axes_connected controller={}", text));
+    case EventKind::axes_lost:
+      return distinct_warn(
+          fmt::format("event=axes_lost why=\"{}\" effect=\"no measurements until it is connected "
+                      "again\"",
+                      text));
+    case EventKind::axes_refused:
+      return distinct_warn(
+          fmt::format("event=axes_refused axis={} answer=\"{}\" effect=\"all motors are switched "
+                      "off\" remedy=\"the controller, then the command RESET\"",
+                      event.a, text));
+    default:
+      return unknown();
+  }
+}
+
 /// Returns the text of a change of what the motion simulator does.
 EventText describe_motion(const Event& event) {
   static constexpr std::array kStates{"none",      "waiting",   "parked", "parking",
@@ -300,6 +320,10 @@ EventText describe(const Event& event) {
           "source, its link, trigger.peer\"");
     case EventKind::motion_changed:
       return describe_motion(event);
+    case EventKind::axes_connected:
+    case EventKind::axes_lost:
+    case EventKind::axes_refused:
+      return describe_axes(event, text);
     case EventKind::gateway_mode: {
       static constexpr std::array kModes{"standby", "operate", "debug"};
       return info(fmt::format("event=gateway_mode mode={}",

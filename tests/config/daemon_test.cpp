@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "config/config_support.hpp"
+#include "emit/config/motion_controller.hpp"
 
 namespace emit::config::testing {
 namespace {
@@ -210,10 +211,47 @@ TEST_F(ConfigTest, a_motion_simulator_is_read_printed_and_checked) {
   EXPECT_THAT(daemon_error(motion_section(5, "target_rings = \"azimuth-elevation\"\n")),
               ::testing::HasSubstr("'target_entity' is missing"));
   EXPECT_THAT(daemon_error(kCanned + "[motion]\ncontroller = \"table\"\n"),
-              ::testing::HasSubstr("'controller' is 'table', must be address:port"));
+              ::testing::HasSubstr("'controller': 'table' must be address:port, "
+                                   "memory:PATH@OFFSET or acutrol:address:port"));
   EXPECT_THAT(daemon_error(kCanned + "[motion]\ncontroller = \"a:1\"\naxes = [ { min_deg = 5, "
                                      "max_deg = 5, rate_deg_s = 1, acceleration_deg_s2 = 1 } ]\n"),
               ::testing::HasSubstr("axis 1 has no travel"));
+}
+
+TEST(MotionController, is_told_by_its_form) {
+  using Kind = MotionController::Kind;
+  const auto udp = parse_motion_controller("[::1]:7010");
+  ASSERT_TRUE(udp.has_value());
+  EXPECT_EQ(udp->kind, Kind::udp);
+  EXPECT_EQ(udp->address, "[::1]:7010");
+  const auto acutrol = parse_motion_controller("acutrol:10.0.0.5:9878");
+  ASSERT_TRUE(acutrol.has_value());
+  EXPECT_EQ(acutrol->kind, Kind::acutrol);
+  EXPECT_EQ(acutrol->address, "10.0.0.5:9878");
+  const auto memory = parse_motion_controller("memory:/dev/shm/a@b@4096");
+  ASSERT_TRUE(memory.has_value());
+  EXPECT_EQ(memory->kind, Kind::memory);
+  EXPECT_EQ(memory->memory.file, "/dev/shm/a@b");
+  EXPECT_EQ(memory->memory.offset_bytes, 4096U);
+  EXPECT_EQ(parse_motion_controller("memory:/dev/rfm0@0x10008")->memory.offset_bytes, 0x10008U);
+}
+
+TEST(MotionController, other_forms_are_refused_with_what_is_wrong) {
+  for (const char* text : {"memory:", "memory:/x", "memory:/x@", "memory:x@0", "memory:@0",
+                           "memory:/@0", "memory:/x@-8", "memory:/x@8k", "memory:/x@0x",
+                           "memory:/x@ 8", "memory:/x@9223372036854775808", "memory:7010"}) {
+    const auto parsed = parse_motion_controller(text);
+    ASSERT_FALSE(parsed.has_value()) << text;
+    EXPECT_THAT(parsed.error().text, ::testing::HasSubstr("must be PATH@OFFSET")) << text;
+  }
+  EXPECT_THAT(parse_motion_controller("memory:/x@4").error().text,
+              ::testing::HasSubstr("multiple of 8 bytes"));
+  for (const char* text : {"acutrol:", "acutrol:10.0.0.5", "acutrol::9878", "acutrol:a:65536",
+                           "other:10.0.0.5:9878", ""}) {
+    const auto parsed = parse_motion_controller(text);
+    ASSERT_FALSE(parsed.has_value()) << text;
+    EXPECT_THAT(parsed.error().text, ::testing::HasSubstr("must be address:port")) << text;
+  }
 }
 
 TEST_F(ConfigTest, an_unknown_scenario_is_reported_where_it_is_named) {

@@ -12,6 +12,7 @@
 
 #include "emit/image/exr_image.hpp"
 #include "emit/protocol/axes.hpp"
+#include "emit/protocol/axes_memory.hpp"
 #include "emit/protocol/convert.hpp"
 #include "emit/protocol/host_session.hpp"
 #include "emit/protocol/net_fdm.hpp"
@@ -566,6 +567,22 @@ void make_axes_seeds() {
   monitor.measured.fill({0.25, -1.5, 20.0});
   monitor.demanded.fill({0.26, -1.5, 20.0});
   keep("monitor", codec.encode(monitor));
+
+  // The same as blocks of memory.
+  command.mode = protocol::AxesMode::follow;
+  command.count = protocol::kMaxAxes;
+  std::array<std::uint64_t, protocol::kAxesCommandWords> command_words{};
+  protocol::store_axes(std::span(command_words), command);
+  std::array<std::uint64_t, protocol::kAxesMonitorWords> monitor_words{};
+  protocol::store_axes(std::span(monitor_words), monitor);
+  const auto keep_block = [](const char* name, std::span<const std::uint64_t> words) {
+    const auto bytes = std::as_bytes(words);
+    write("axes_memory", name, Bytes(bytes.begin(), bytes.end()));
+  };
+  keep_block("follow", command_words);
+  keep_block("monitor", monitor_words);
+  command_words.front() += 1;
+  keep_block("torn", command_words);
 }
 
 void make_cigi_seeds() {

@@ -48,9 +48,11 @@ Key<MotionConfig> rotation(std::string name, Field field, std::string meaning) {
 
 const KeyTable<MotionConfig>& motion_keys() {
   static const KeyTable<MotionConfig> keys = {
-      text<MotionConfig>("controller", EMIT_FIELD(controller),
-                         "`address:port` of the controller, which takes the messages of wire.md "
-                         "section 12. When it is empty, there is no motion simulator."),
+      text<MotionConfig>(
+          "controller", EMIT_FIELD(controller),
+          "`address:port` of a controller that takes messages of wire.md section 12, "
+          "`memory:PATH@OFFSET` (section 13), or `acutrol:address:port` (ACUTROL "
+          "commands). Empty: no motion simulator."),
       number<MotionConfig>("rate_hz", "Hz", between(10, 2000), EMIT_FIELD(rate_hz),
                            "Commands a second."),
       choice<MotionConfig>(

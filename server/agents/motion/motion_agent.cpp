@@ -56,7 +56,7 @@ int MotionAgent::take_poses(std::int64_t now_ns) noexcept {
 int MotionAgent::take_monitors(std::int64_t now_ns) noexcept {
   int work = 0;
   for (; work < kMostPerTurn; ++work) {
-    const auto monitor = port_.receive();
+    const auto monitor = link_->receive(now_ns);
     if (!monitor) break;
     const auto feedback = follower_.take(*monitor, now_ns);
     if (!feedback) {
@@ -75,7 +75,7 @@ int MotionAgent::take_monitors(std::int64_t now_ns) noexcept {
 
 void MotionAgent::command(std::int64_t now_ns) noexcept {
   context_.motion_times.late.record(now_ns - due_ns_);
-  port_.send(follower_.step(now_ns));
+  link_->send(follower_.step(now_ns), now_ns);
   // Commands that are due already are left out: the axes need the newest one alone.
   const std::int64_t missed = (now_ns - due_ns_) / period_ns_;
   if (missed > 0) {
@@ -134,8 +134,9 @@ void MotionAgent::report(const AxisFeedback* feedback) noexcept {
 }
 
 void MotionAgent::on_stop() noexcept {
-  follower_.reset(context_.clock.tai_ns());
-  port_.send(follower_.step(context_.clock.tai_ns()));
+  const std::int64_t now_ns = context_.clock.tai_ns();
+  follower_.reset(now_ns);
+  link_->send(follower_.step(now_ns), now_ns);
 }
 
 }  // namespace emit::server

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstdint>
+#include <memory>
 #include <utility>
 
 #include "agents/agent.hpp"
 #include "agents/context.hpp"
-#include "agents/motion/axes_port.hpp"
+#include "axes/axes_link.hpp"
 #include "motion/table_follower.hpp"
 
 namespace emit::server {
@@ -15,10 +16,11 @@ namespace emit::server {
 class MotionAgent final : public Agent {
  public:
   /// @param period_ns  time between two commands, as the follower has it
-  MotionAgent(Context& context, AxesPort port, TableFollower follower, std::int64_t period_ns)
+  MotionAgent(Context& context, std::unique_ptr<AxesLink> link, TableFollower follower,
+              std::int64_t period_ns)
       : Agent(context.bells.motion),
         context_(context),
-        port_(std::move(port)),
+        link_(std::move(link)),
         follower_(std::move(follower)),
         period_ns_(period_ns) {}
 
@@ -26,7 +28,7 @@ class MotionAgent final : public Agent {
   [[nodiscard]] bool on_start() noexcept override;
   int do_work(std::int64_t now_ns) noexcept override;
   [[nodiscard]] std::int64_t wake_at_ns() const noexcept override { return due_ns_; }
-  [[nodiscard]] int wait_fd() const noexcept override { return port_.fd(); }
+  [[nodiscard]] int wait_fd() const noexcept override { return link_->fd(); }
   /// Switches the motors off, so that the axes do not wait for a timeout to stop.
   void on_stop() noexcept override;
 
@@ -39,7 +41,7 @@ class MotionAgent final : public Agent {
   void note_status() noexcept;
 
   Context& context_;
-  AxesPort port_;
+  std::unique_ptr<AxesLink> link_;
   TableFollower follower_;
   std::int64_t period_ns_;
   std::int64_t due_ns_ = 0;      ///< instant of the next command, wall

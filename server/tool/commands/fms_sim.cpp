@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
-#include <sys/socket.h>
 #include <time.h>
 
 #include <algorithm>
@@ -10,22 +9,23 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <span>
+#include <filesystem>
+#include <memory>
+#include <optional>
 #include <string_view>
 #include <utility>
 
 #include "emit/physics/constants.hpp"
 #include "emit/protocol/axes.hpp"
 #include "motion/table_simulator.hpp"
-#include "net/socket.hpp"
 #include "rt/clock.hpp"
 #include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
+#include "tool/commands/fms_sim_port.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
 #include "tool/support/progress.hpp"
-#include "tool/support/statistics.hpp"
 
 namespace emit::tool {
 namespace {
@@ -41,6 +41,8 @@ struct PlannedFault {
 
 struct FmsSimOptions {
   std::string listen = fmt::format("127.0.0.1:{}", protocol::kDefaultAxesPort);
+  std::optional<config::MemoryPlace> memory;
+  std::string acutrol;  ///< empty: not served
   std::uint32_t axes = 5;
   double rate_hz = 1000.0;
   double seconds = 0.0;  ///< 0: until interrupted
@@ -100,28 +102,13 @@ server::TableSimulator::Options table_of(const FmsSimOptions& command) {
   return out;
 }
 
-/// Counts of what the controller took, lost and did.
-struct FmsSimFigures {
-  std::uint64_t commands = 0;
-  std::uint64_t missing = 0;  ///< gaps of the commands' counter
-  std::uint64_t dropped = 0;  ///< older than the latest one, or for another number of axes
-  std::uint64_t malformed = 0;
-  std::uint64_t timeouts = 0;
-  std::uint64_t failed_sends = 0;
-  std::uint64_t last_counter = 0;
-  std::uint64_t following_steps = 0;
-  Samples late_us{std::size_t{1} << 16U};
-  std::array<double, protocol::kMaxAxes> squares_rad2{};
-  std::array<double, protocol::kMaxAxes> most_rad{};
-};
-
 class FmsSimRun {
  public:
-  FmsSimRun(const FmsSimOptions& command, server::TableSimulator table, server::UdpSocket socket,
-            std::vector<PlannedFault> faults)
+  FmsSimRun(const FmsSimOptions& command, server::TableSimulator table,
+            std::unique_ptr<FmsSimPort> port, std::vector<PlannedFault> faults)
       : command_(command),
         table_(std::move(table)),
-        socket_(std::move(socket)),
+        port_(std::move(port)),
         faults_(std::move(faults)) {}
 
   /// Runs to the end, or until it is interrupted. Errors: io (the clock).
@@ -153,8 +140,10 @@ class FmsSimRun {
           table_.set_fault(fault.axis, fault.fault);
         }
       }
-      take_commands(due_ns);
-      report(table_.step(due_ns));
+      port_->take(table_, due_ns, figures_);
+      const protocol::AxesMonitor& monitor = table_.step(due_ns);
+      note(monitor);
+      port_->report(monitor, due_ns, figures_);
       if (steps != 0) progress.advance_to(step);
     }
     progress.finish();
@@ -163,45 +152,8 @@ class FmsSimRun {
   [[nodiscard]] const FmsSimFigures& figures() const noexcept { return figures_; }
 
  private:
-  /// Takes commands that have arrived, so many at a time that a flood does not stop the axes.
-  void take_commands(std::int64_t now_ns) {
-    constexpr int kMostCommands = 64;
-    for (int i = 0; i < kMostCommands; ++i) {
-      std::array<std::byte, protocol::kMaxAxesBytes + 1> space;
-      server::SocketAddress from;
-      from.length = sizeof(from.storage);
-      const ssize_t size = ::recvfrom(socket_.fd(), space.data(), space.size(), MSG_DONTWAIT,
-                                      from.get(), &from.length);
-      if (size < 0) return;
-      protocol::AxesCommand command;
-      const auto bytes = std::span(space).first(static_cast<std::size_t>(size));
-      if (const auto fault = codec_.decode(bytes, command); fault != protocol::AxesFault::none) {
-        if (figures_.malformed++ == 0) {
-          warn(fmt::format("a datagram is no command: {}", protocol::to_string(fault)));
-        }
-        continue;
-      }
-      if (!table_.take(command, now_ns)) {
-        ++figures_.dropped;
-        continue;
-      }
-      if (figures_.commands++ == 0 && std::abs(command.time_ns - now_ns) > 1'000'000'000) {
-        warn(
-            "the host's clock and this one differ by more than a second: demands hold on "
-            "CLOCK_TAI");
-      }
-      if (figures_.last_counter != 0) {
-        if (command.counter > figures_.last_counter) {
-          figures_.missing += command.counter - figures_.last_counter - 1;
-        }
-      }
-      figures_.last_counter = command.counter;
-      host_ = from;
-    }
-  }
-
-  /// Sends the state to the host and keeps what the axes did.
-  void report(const protocol::AxesMonitor& monitor) {
+  /// Keeps what the axes did, and tells of changes of the state.
+  void note(const protocol::AxesMonitor& monitor) {
     if (monitor.timed_out && !timed_out_) ++figures_.timeouts;
     timed_out_ = monitor.timed_out;
     if (monitor.state != state_) {
@@ -217,19 +169,13 @@ class FmsSimRun {
         figures_.most_rad[i] = std::max(figures_.most_rad[i], std::abs(error_rad));
       }
     }
-    if (host_.length == 0) return;
-    if (socket_.send_to(codec_.encode(monitor), host_).status != server::IoStatus::done) {
-      ++figures_.failed_sends;
-    }
   }
 
   const FmsSimOptions& command_;
   server::TableSimulator table_;
-  server::UdpSocket socket_;
+  std::unique_ptr<FmsSimPort> port_;
   std::vector<PlannedFault> faults_;
   const server::SystemClock clock_;
-  protocol::AxesCodec codec_;
-  server::SocketAddress host_;  ///< sender of the latest command; length 0: none yet
   protocol::AxesState state_ = protocol::AxesState::motors_off;
   bool timed_out_ = false;
   FmsSimFigures figures_;
@@ -240,6 +186,7 @@ Json to_json(const FmsSimOptions& command, const FmsSimFigures& figures) {
   json.set("rate_hz", command.rate_hz).set("steps", figures.late_us.count());
   json.set("commands", figures.commands).set("commands_missing", figures.missing);
   json.set("commands_dropped", figures.dropped).set("commands_malformed", figures.malformed);
+  json.set("torn_reads", figures.torn);
   json.set("timeouts", figures.timeouts).set("failed_sends", figures.failed_sends);
   json.set("late_p50_us", figures.late_us.percentile(0.5));
   json.set("late_p99_us", figures.late_us.percentile(0.99));
@@ -257,6 +204,12 @@ Json to_json(const FmsSimOptions& command, const FmsSimFigures& figures) {
   return json;
 }
 
+physics::Result<std::unique_ptr<FmsSimPort>> open_port(const FmsSimOptions& command) {
+  if (command.memory) return open_memory_port(*command.memory);
+  if (!command.acutrol.empty()) return open_acutrol_port(command.acutrol, command.axes);
+  return open_udp_port(command.listen);
+}
+
 int run(const FmsSimOptions& command) {
   std::vector<PlannedFault> faults;
   for (const std::string& text : command.faults) {
@@ -268,20 +221,14 @@ int run(const FmsSimOptions& command) {
   std::ranges::stable_sort(faults, {}, &PlannedFault::at_s);
   auto table = server::TableSimulator::create(table_of(command));
   if (!table) return fail_call(table.error());
-  const auto where = server::parse_host_port(command.listen);
-  if (!where) return fail(kExitUsage, where.error().text);
-  const auto address = server::resolve(*where, server::Transport::udp, true);
-  if (!address) return fail(address.error());
-  const server::SocketContext context;
-  auto socket = server::UdpSocket::open_bound(context, *address);
-  if (!socket) return fail(socket.error());
+  auto port = open_port(command);
+  if (!port) return fail_call(port.error());
   const InterruptGuard interrupt;
   // Tell scripts which port was taken, as emitd does.
-  fmt::print(text_stream(command.json), "ready axes_udp={}\n",
-             server::to_string(socket->local_address()));
+  fmt::print(text_stream(command.json), "ready {}\n", (*port)->name());
   std::fflush(text_stream(command.json));
 
-  FmsSimRun run(command, std::move(*table), std::move(*socket), std::move(faults));
+  FmsSimRun run(command, std::move(*table), std::move(*port), std::move(faults));
   if (const auto done = run.run(); !done) return fail(done.error());
   const FmsSimFigures& figures = run.figures();
   fmt::print(text_stream(command.json),
@@ -299,9 +246,28 @@ int run(const FmsSimOptions& command) {
 }
 
 void add_options(CommandLine& line, FmsSimOptions& options) {
-  line.option("--listen", options.listen, "Address and UDP port of the controller; port 0: any")
+  Option listen =
+      line.option("--listen", options.listen, "Address and UDP port of the controller; port 0: any")
+          .type_name("HOST:PORT")
+          .show_default();
+  Option memory =
+      line.parsed(
+              "--memory",
+              [&options](const std::string& text) -> physics::Result<void> {
+                auto place = config::parse_memory_place(text);
+                if (!place) return tl::unexpected(std::move(place.error()));
+                options.memory = std::move(*place);
+                return {};
+              },
+              "Talk through blocks of a file or device instead; the file is made where there is "
+              "none")
+          .type_name("PATH@OFFSET")
+          .excludes(listen);
+  line.option("--acutrol", options.acutrol,
+              "Serve the ACUTROL command language by TCP instead; port 0: any")
       .type_name("HOST:PORT")
-      .show_default();
+      .excludes(listen)
+      .excludes(memory);
   line.option("--axes", options.axes, "Number of axes: the rings of the unit, then the target's")
       .in_range(1U, static_cast<unsigned>(protocol::kMaxAxes))
       .show_default();
@@ -346,7 +312,7 @@ void add_options(CommandLine& line, FmsSimOptions& options) {
 void add_fms_sim(CommandLine& tool) {
   tool.command<FmsSimOptions>(
       {.name = "fms-sim",
-       .text = "Flight motion simulator stand-in: axes that answer commands by UDP",
+       .text = "Flight motion simulator stand-in: axes that answer commands by UDP, memory or TCP",
        .example = "emit fms-sim --listen 127.0.0.1:7010 --fault 2:stuck@20 --seconds 60"},
       add_options, run);
 }

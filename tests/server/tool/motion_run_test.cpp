@@ -48,15 +48,17 @@ std::string swinging_poses(int seconds) {
   return out;
 }
 
-TEST(MotionRun, a_real_loop_follows_is_flagged_when_it_does_not_and_replays) {
-  ScratchFolder folder;
-  ToolProcess table(folder, "fms", {"fms-sim", "--listen", "127.0.0.1:0", "--axes", "3"});
-  const std::string ready = "ready axes_udp=";
-  ASSERT_TRUE(wait_until([&] { return table.out().find('\n') != std::string::npos; }));
-  ASSERT_EQ(table.out().rfind(ready, 0), 0U) << table.err();
-  const std::string controller =
-      table.out().substr(ready.size(), table.out().find('\n') - ready.size());
+/// Starts a table of three axes, and returns the end of its "ready KEY=" line; "" when it does not
+/// start.
+std::string start_table(const ToolProcess& table, const std::string& key) {
+  const std::string ready = "ready " + key + "=";
+  if (!wait_until([&] { return table.out().find('\n') != std::string::npos; })) return "";
+  if (table.out().rfind(ready, 0) != 0) return "";
+  return table.out().substr(ready.size(), table.out().find('\n') - ready.size());
+}
 
+/// Writes the configuration of a daemon with a world of one box and a controller. Returns its name.
+std::string write_daemon(const ScratchFolder& folder, const std::string& motion) {
   folder.write("world.toml",
                "epoch_utc = 2020-06-21T06:00:00Z\n[place]\nlat_deg = 48.0\nlon_deg = 11.0\n"
                "[[object]]\ngltf = \"share:scenes/box.glb\"\n[[channel]]\nname = \"shown\"\n"
@@ -71,16 +73,23 @@ TEST(MotionRun, a_real_loop_follows_is_flagged_when_it_does_not_and_replays) {
   for (int i = 0; i < 3; ++i) {
     axes += "{ min_deg = -100, max_deg = 100, rate_deg_s = 300, acceleration_deg_s2 = 5000 }, ";
   }
-  DaemonProcess daemon(
-      folder,
-      {"--config", folder.write("emitd.toml",
-                                "scenario = \"world.toml\"\n[pacing]\nmode = \"ig-clock\"\n"
-                                "rate_hz = 50\n[motion]\ncontroller = \"" +
-                                    controller + "\"\nfeedback_timeout_ms = 1000\naxes = [" + axes +
-                                    "]\n[host]\nudp = \"127.0.0.1:0\"\n"
-                                    "[control]\ntcp = \"127.0.0.1:0\"\n"
-                                    "[journal]\nfile = \"journal.mcap\"\n"
-                                    "[metrics]\nlisten = \"127.0.0.1:0\"\n")});
+  return folder.write("emitd.toml",
+                      "scenario = \"world.toml\"\n[pacing]\nmode = \"ig-clock\"\n"
+                      "rate_hz = 50\n[motion]\n" +
+                          motion + "\nfeedback_timeout_ms = 1000\naxes = [" + axes +
+                          "]\n[host]\nudp = \"127.0.0.1:0\"\n"
+                          "[control]\ntcp = \"127.0.0.1:0\"\n"
+                          "[journal]\nfile = \"journal.mcap\"\n"
+                          "[metrics]\nlisten = \"127.0.0.1:0\"\n");
+}
+
+TEST(MotionRun, a_real_loop_follows_is_flagged_when_it_does_not_and_replays) {
+  ScratchFolder folder;
+  ToolProcess table(folder, "fms", {"fms-sim", "--listen", "127.0.0.1:0", "--axes", "3"});
+  const std::string controller = start_table(table, "axes_udp");
+  ASSERT_NE(controller, "") << table.err();
+  DaemonProcess daemon(folder,
+                       {"--config", write_daemon(folder, "controller = \"" + controller + "\"")});
   ASSERT_TRUE(daemon.wait_ready(kMotionLimit)) << folder.read("stderr");
   const auto metric = [&](const std::string& name) {
     const auto answer = client::http_get("http://" + daemon.metrics() + "/metrics", kLongNs);
@@ -120,6 +129,56 @@ TEST(MotionRun, a_real_loop_follows_is_flagged_when_it_does_not_and_replays) {
                kMotionLimit);
   EXPECT_EQ(replayed.exit_code, 0) << replayed.out << replayed.err;
   EXPECT_THAT(replayed.out, HasSubstr("0 differ from the recording"));
+}
+
+/// A way to the controller: option of the simulator, key of its ready line, and what emitd is told.
+struct Way {
+  std::string option;
+  std::string place;
+  std::string key;
+  std::string prefix;
+  std::string rate;
+};
+
+TEST(MotionRun, memory_and_acutrol_commands_do_the_same) {
+  ScratchFolder folder;
+  for (const Way& way :
+       {Way{"--memory", folder.file("axes") + "@128", "axes_memory", "memory:", "rate_hz = 1000"},
+        Way{"--acutrol", "127.0.0.1:0", "axes_acutrol", "acutrol:", "rate_hz = 100"}}) {
+    SCOPED_TRACE(way.option);
+    ToolProcess table(folder, "fms" + way.option,
+                      {"fms-sim", way.option, way.place, "--axes", "3"});
+    const std::string controller = start_table(table, way.key);
+    ASSERT_NE(controller, "") << table.err();
+    DaemonProcess daemon(
+        folder, {"--config", write_daemon(folder, "controller = \"" + way.prefix + controller +
+                                                      "\"\n" + way.rate)});
+    ASSERT_TRUE(daemon.wait_ready(kMotionLimit)) << folder.read("stderr");
+    const auto metric = [&](const std::string& name) {
+      const auto answer = client::http_get("http://" + daemon.metrics() + "/metrics", kLongNs);
+      return answer ? Exposition(answer->body).value(name) : -1.0;
+    };
+    ToolProcess host(folder, "send" + way.option,
+                     {"send", folder.write("poses.csv", swinging_poses(100)), "--to",
+                      "udp://" + daemon.host_udp()});
+    EXPECT_TRUE(wait_until([&] {
+      return metric("emitd_motion_pointing_error_pixels_count") > 50.0;
+    })) << folder.read("stderr")
+        << table.err();
+    EXPECT_EQ(metric("emitd_axes_reports_refused_total"), 0.0);
+    EXPECT_EQ(metric("emitd_axes_connections_lost_total"), 0.0);
+    EXPECT_GT(metric("emitd_axes_reports_total"), 100.0);
+    host.signal(SIGINT);
+    daemon.signal(SIGTERM);
+    EXPECT_EQ(daemon.wait(), 0);
+    EXPECT_THAT(folder.read("stderr"), HasSubstr("event=motion state=following faults=none"));
+    // The daemon switches the motors off when it ends.
+    EXPECT_TRUE(wait_until([&] { return table.err().rfind("motors off") != std::string::npos; }))
+        << table.err();
+    table.signal(SIGINT);
+    EXPECT_EQ(table.wait(), 0);
+    EXPECT_THAT(table.out(), HasSubstr("0 malformed"));
+  }
 }
 
 }  // namespace

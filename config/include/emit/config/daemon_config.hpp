@@ -60,7 +60,7 @@ struct MotionAxisConfig {
 
 /// The flight motion simulator.
 struct MotionConfig {
-  std::string controller;  ///< address:port of its controller; empty: there is none
+  std::string controller;  ///< parse_motion_controller() reads it; empty: there is none
   double rate_hz = 1000.0;
   std::string unit_rings = "yaw-pitch-roll";  ///< outermost first
   TargetRings target_rings = TargetRings::none;

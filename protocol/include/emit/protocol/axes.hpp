@@ -84,6 +84,11 @@ enum class AxesFault : std::uint8_t {
 /// Returns the English name of a fault, for messages. RT-safe.
 [[nodiscard]] std::string_view to_string(AxesFault fault) noexcept;
 
+/// Returns what a receiver has to refuse in the contents of a message: an enumerator that does not
+/// exist (malformed), a number of axes (axes), or a number out of range (value). RT-safe.
+[[nodiscard]] AxesFault check(const AxesCommand& command) noexcept;
+[[nodiscard]] AxesFault check(const AxesMonitor& monitor) noexcept;
+
 /// Encodes and decodes messages in memory that it uses again for every one.
 /// Thread: one owner.  Real time: the constructor allocates, the rest is RT-safe for messages
 /// without unknown fields.

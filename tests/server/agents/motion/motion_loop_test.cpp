@@ -1,25 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 // The loop through a motion simulator on a fake clock: host, conductor, motion agent and a
-// simulated table that is reached by UDP.
-#include <fmt/format.h>
+// simulated table that is reached by UDP, by memory or by ACUTROL commands.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
 
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "agents/motion/motion_agent.hpp"
 #include "agents/motion/motion_setup.hpp"
+#include "axes/open_axes_link.hpp"
 #include "emit/physics/constants.hpp"
 #include "motion/table_simulator.hpp"
 #include "support/conductor_rig.hpp"
+#include "support/table_ends.hpp"
 
 namespace emit::server {
 namespace {
@@ -32,7 +32,10 @@ constexpr glm::dvec2 kSizePx{640.0, 512.0};
 const double kFocalPx = 320.0 / std::tan(5.0 * physics::kDegree);
 const glm::dvec3 kTargetM{900.0, 1200.0, 250.0};
 
+enum class Link : std::uint8_t { udp, memory, acutrol };
+
 struct LoopOptions {
+  Link link = Link::udp;
   std::string rings = "yaw-pitch-roll";
   double delay_s = 0.001;
   double noise_arcsec = 0.0;
@@ -41,9 +44,9 @@ struct LoopOptions {
   bool applies_shift = false;  ///< a second channel shows a window, moved by the shift
 };
 
-config::DaemonConfig daemon_config(const LoopOptions& options, std::uint16_t port) {
+config::DaemonConfig daemon_config(const LoopOptions& options, const std::string& controller) {
   config::DaemonConfig config;
-  config.motion.controller = fmt::format("127.0.0.1:{}", port);
+  config.motion.controller = controller;
   config.motion.unit_rings = options.rings;
   config.motion.target_rings = config::TargetRings::azimuth_elevation;
   config.motion.target_entity = 7;
@@ -71,61 +74,35 @@ std::vector<Channel> channels_of(scene::ChannelKind kind) {
   return {channel};
 }
 
-/// A UDP port of the table, made before the agent that connects to it.
-class TablePort {
- public:
-  TablePort() {
-    const auto where = parse_host_port("127.0.0.1:0");
-    auto socket = UdpSocket::open_bound(context_, *resolve(*where, Transport::udp, true));
-    EXPECT_TRUE(socket.has_value());
-    socket_ = std::move(*socket);
+std::unique_ptr<test::TableEnd> make_end(Link link) {
+  switch (link) {
+    case Link::udp:
+      return std::make_unique<test::UdpTableEnd>();
+    case Link::memory:
+      return std::make_unique<test::MemoryTableEnd>();
+    case Link::acutrol:
+      break;
   }
-  [[nodiscard]] std::uint16_t port() const { return socket_.local_address().port(); }
-  /// Calls `use` for every command that has arrived.
-  template <class Use>
-  void receive(const Use& use) {
-    for (;;) {
-      std::array<std::byte, protocol::kMaxAxesBytes> space;
-      SocketAddress from;
-      from.length = sizeof(from.storage);
-      const ssize_t size = ::recvfrom(socket_.fd(), space.data(), space.size(), MSG_DONTWAIT,
-                                      from.get(), &from.length);
-      if (size < 0) return;
-      host_ = from;
-      protocol::AxesCommand command;
-      EXPECT_EQ(codec_.decode(std::span(space).first(static_cast<std::size_t>(size)), command),
-                protocol::AxesFault::none);
-      use(command);
-    }
-  }
-  void send(const protocol::AxesMonitor& monitor) {
-    if (host_.length == 0) return;
-    EXPECT_EQ(socket_.send_to(codec_.encode(monitor), host_).status, IoStatus::done);
-  }
-
- private:
-  const SocketContext context_;
-  UdpSocket socket_;
-  protocol::AxesCodec codec_;
-  SocketAddress host_;
-};
+  return std::make_unique<test::AcutrolTableEnd>();
+}
 
 /// Everything in the loop, with frames at 100 Hz, poses at 100 Hz and axes at 1 kHz.
 class Loop {
  public:
   explicit Loop(const LoopOptions& options)
       : options_(options),
-        plan_(*make_motion_plan(daemon_config(options, port_.port()), scenario_with_target(),
+        end_(make_end(options.link)),
+        plan_(*make_motion_plan(daemon_config(options, end_->controller()), scenario_with_target(),
                                 channels_of(options.projects ? scene::ChannelKind::projector
                                                              : scene::ChannelKind::injection))),
         rig_(pacing(options), scenario_with_target(), false, &plan_) {
-    auto port = AxesPort::open(daemon_config(options, port_.port()).motion.controller,
-                               rig_.context().counters);
-    EXPECT_TRUE(port.has_value());
+    auto link = open_axes_link(daemon_config(options, end_->controller()).motion,
+                               rig_.context().counters, rig_.context().motion_events);
+    EXPECT_TRUE(link.has_value());
     auto follower = TableFollower::create(plan_.follower);
     EXPECT_TRUE(follower.has_value());
     if (options.applies_shift) apply_shift();
-    agent_.emplace(rig_.context(), std::move(*port), std::move(*follower), kMs);
+    agent_.emplace(rig_.context(), std::move(*link), std::move(*follower), kMs);
     EXPECT_TRUE(agent_->on_start());
     TableSimulator::Options simulated;
     TableSimulator::Axis axis;
@@ -134,6 +111,7 @@ class Loop {
     axis.dynamics.delay_s = options.delay_s;
     axis.dynamics.noise_rad = options.noise_arcsec * physics::kDegree / 3600.0;
     simulated.axes.assign(5, axis);
+    simulated.step_ns = step_ns();
     auto table = TableSimulator::create(simulated);
     EXPECT_TRUE(table.has_value());
     table_.emplace(std::move(*table));
@@ -142,17 +120,19 @@ class Loop {
 
   void run(std::int64_t for_ns) {
     for (std::int64_t end_ns = rig_.clock.tai_ns() + for_ns; rig_.clock.tai_ns() < end_ns;) {
-      rig_.clock.advance(kMs);
-      const std::int64_t now_ns = rig_.clock.tai_ns();
-      if (host_speaks && sim_ns() % (10 * kMs) == 5 * kMs) send_pose();
-      port_.receive([&](const protocol::AxesCommand& command) {
-        EXPECT_TRUE(table_->take(command, now_ns));
-        last_mode = command.mode;
-      });
-      const protocol::AxesMonitor& monitor = table_->step(now_ns);
-      monitors.push_back(monitor);
-      if (controller_answers) port_.send(monitor);
-      if (agent_runs) agent_->do_work(now_ns);
+      // Answers that are asked for need as long to come as the questions did.
+      if (options_.link == Link::acutrol) {
+        rig_.clock.advance(kMs / 2);
+        turn_table(controller_answers);
+        rig_.clock.advance(kMs / 2);
+        if (host_speaks && sim_ns() % (10 * kMs) == 5 * kMs) send_pose();
+        turn_table(false);
+      } else {
+        rig_.clock.advance(kMs);
+        if (host_speaks && sim_ns() % (10 * kMs) == 5 * kMs) send_pose();
+        turn_table(controller_answers);
+      }
+      if (agent_runs) agent_->do_work(rig_.clock.tai_ns());
       rig_.settle();
     }
   }
@@ -190,7 +170,7 @@ class Loop {
 
   test::ConductorRig& rig() { return rig_; }
   std::vector<protocol::AxesMonitor> monitors;
-  protocol::AxesMode last_mode = protocol::AxesMode::off;
+  [[nodiscard]] protocol::AxesMode last_mode() const { return end_->last_mode; }
   bool host_speaks = true;
   bool controller_answers = true;
   bool agent_runs = true;
@@ -247,8 +227,19 @@ class Loop {
         .send(++number_, sim_ns(), 0.0, host_run);
   }
 
+  [[nodiscard]] std::int64_t step_ns() const {
+    return options_.link == Link::acutrol ? kMs / 2 : kMs;
+  }
+  void turn_table(bool answers) {
+    const std::int64_t now_ns = rig_.clock.tai_ns();
+    end_->take(*table_, now_ns);
+    const protocol::AxesMonitor& monitor = table_->step(now_ns);
+    monitors.push_back(monitor);
+    if (answers) end_->report(monitor, now_ns);
+  }
+
   LoopOptions options_;
-  TablePort port_;
+  std::unique_ptr<test::TableEnd> end_;
   MotionPlan plan_;
   test::ConductorRig rig_;
   const std::int64_t start_ns_ = rig_.clock.tai_ns();
@@ -278,8 +269,18 @@ Pointing pointing_of(Loop& loop, std::size_t from, const glm::dvec2& from_centre
   return out;
 }
 
-TEST(MotionLoop, a_minute_of_projection_points_within_a_tenth_of_a_pixel) {
+/// Tests of every way to the controller.
+class MotionLoopBy : public ::testing::TestWithParam<Link> {};
+std::string name_of(const ::testing::TestParamInfo<Link>& test) {
+  constexpr std::array kNames = {"udp", "memory", "acutrol"};
+  return kNames[static_cast<std::size_t>(test.param)];
+}
+INSTANTIATE_TEST_SUITE_P(Links, MotionLoopBy,
+                         ::testing::Values(Link::udp, Link::memory, Link::acutrol), name_of);
+
+TEST_P(MotionLoopBy, a_minute_of_projection_points_within_a_tenth_of_a_pixel) {
   LoopOptions options;
+  options.link = GetParam();
   options.noise_arcsec = 1.0;
   Loop loop(options);
   loop.run(10 * kSecondNs);
@@ -299,6 +300,7 @@ TEST(MotionLoop, a_minute_of_projection_points_within_a_tenth_of_a_pixel) {
     EXPECT_GE(pointing.frames, 5990);
     EXPECT_LT(pointing.rms_px, 0.1);
     EXPECT_LT(pointing.max_px, 0.4);
+    RecordProperty(fmt::format("rms_px_{:.0f}", place.x), fmt::format("{:.4f}", pointing.rms_px));
     EXPECT_GT(pointing.rms_px, 1e-4) << "noise and lag cannot leave nothing";
   }
   // The header tells the error of earlier frames, and the metrics hold all of them.
@@ -307,8 +309,31 @@ TEST(MotionLoop, a_minute_of_projection_points_within_a_tenth_of_a_pixel) {
   EXPECT_LT(told_px, 0.4);
   EXPECT_LT(loop.rig().context().motion_times.pointing.max.load(), 0.4);
   EXPECT_EQ(loop.rig().count(Counter::axes_reports_refused), 0U);
+  EXPECT_EQ(loop.rig().count(Counter::axes_torn_reads), 0U);
+  EXPECT_EQ(loop.rig().count(Counter::axes_connections_lost), 0U);
+  EXPECT_GT(loop.rig().count(Counter::axes_reports), 69'000U) << "one for nearly every command";
   EXPECT_EQ(loop.rig().count(Counter::axes_inputs_dropped), 0U);
   EXPECT_EQ(loop.rig().count(Counter::axes_reports_dropped), 0U);
+}
+
+TEST_P(MotionLoopBy, frames_say_that_a_controller_is_silent) {
+  LoopOptions options;
+  options.link = GetParam();
+  Loop loop(options);
+  loop.run(8 * kSecondNs);
+  EXPECT_EQ(loop.rig().frames.back().header.flags & protocol::kFlagMotionFault, 0U);
+  const std::size_t from = loop.rig().frames.size();
+  loop.controller_answers = false;
+  loop.run(100 * kMs);
+  const protocol::FrameHeader header = loop.rig().frames.back().header;
+  EXPECT_EQ(header.motion_faults, protocol::kMotionNoFeedback);
+  EXPECT_EQ(header.motion_state, MotionState::waiting);
+  loop.run(2 * kSecondNs);
+  EXPECT_EQ(loop.rig().frames.size() - from, 210U) << "frames go on";
+  loop.controller_answers = true;
+  loop.run(12 * kSecondNs);
+  EXPECT_EQ(loop.rig().frames.back().header.flags & protocol::kFlagMotionFault, 0U);
+  EXPECT_EQ(loop.rig().frames.back().header.motion_state, MotionState::following);
 }
 
 /// A frame whose display the axes reach without prediction leaves geometry alone.
@@ -363,7 +388,7 @@ TEST(MotionLoop, frames_say_why_the_axes_do_not_follow) {
   EXPECT_NE(header.flags & protocol::kFlagMotionFault, 0U);
   EXPECT_EQ(header.motion_faults, protocol::kMotionNoFeedback);
   EXPECT_EQ(header.motion_state, MotionState::waiting);
-  EXPECT_EQ(loop.last_mode, protocol::AxesMode::park);
+  EXPECT_EQ(loop.last_mode(), protocol::AxesMode::park);
   EXPECT_EQ(loop.rig().count(Counter::axes_feedback_losses), 1U);
   loop.controller_answers = true;
   loop.run(8 * kSecondNs);
@@ -374,7 +399,7 @@ TEST(MotionLoop, frames_say_why_the_axes_do_not_follow) {
   header = loop.rig().frames.back().header;
   EXPECT_NE(header.flags & protocol::kFlagMotionFault, 0U);
   EXPECT_NE(header.motion_faults & protocol::kMotionNoHost, 0);
-  EXPECT_EQ(loop.last_mode, protocol::AxesMode::park);
+  EXPECT_EQ(loop.last_mode(), protocol::AxesMode::park);
   EXPECT_GT(loop.rig().count(Counter::frames_motion_fault), 0U);
 }
 
@@ -401,12 +426,12 @@ TEST(MotionLoop, a_stopped_run_parks_the_axes_and_a_reset_closes_the_interlock) 
   // The target rises by 1.5 degrees while the run is stopped, and is not told of again.
   loop.target_m = kTargetM + glm::dvec3(0.0, 0.0, 40.0);
   loop.run(500 * kMs);
-  EXPECT_EQ(loop.last_mode, protocol::AxesMode::park);
+  EXPECT_EQ(loop.last_mode(), protocol::AxesMode::park);
   loop.target_every = 1'000'000;
 
   loop.rig().command(CommandKind::start);
   loop.run(8 * kSecondNs);
-  EXPECT_EQ(loop.last_mode, protocol::AxesMode::follow);
+  EXPECT_EQ(loop.last_mode(), protocol::AxesMode::follow);
   EXPECT_GT(std::abs(loop.monitors.back().demanded[4].angle_rad - elevation_rad), 0.01)
       << "the rings point to where it went";
 
@@ -535,7 +560,7 @@ TEST(MotionLoop, a_repeated_frame_says_what_remains_of_the_shift) {
 }
 
 TEST(MotionLoop, a_target_that_the_scenario_lacks_is_refused) {
-  config::DaemonConfig config = daemon_config({}, 1);
+  config::DaemonConfig config = daemon_config({}, "127.0.0.1:1");
   config.motion.target_entity = 8;
   const auto plan =
       make_motion_plan(config, scenario_with_target(), channels_of(scene::ChannelKind::projector));
@@ -556,7 +581,8 @@ TEST(MotionLoop, an_agent_that_did_not_run_leaves_out_commands_and_counts_them) 
 TEST(MotionLoop, both_kinds_of_channels_in_one_daemon_are_refused) {
   std::vector<Channel> channels = channels_of(scene::ChannelKind::projector);
   channels.push_back(channels_of(scene::ChannelKind::injection).front());
-  const auto plan = make_motion_plan(daemon_config({}, 1), scenario_with_target(), channels);
+  const auto plan =
+      make_motion_plan(daemon_config({}, "127.0.0.1:1"), scenario_with_target(), channels);
   ASSERT_FALSE(plan.has_value());
   EXPECT_THAT(plan.error().text, ::testing::HasSubstr("two daemons"));
 }

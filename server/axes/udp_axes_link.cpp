@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "agents/motion/axes_port.hpp"
+#include "axes/udp_axes_link.hpp"
 
 #include <array>
 #include <cstddef>
@@ -13,22 +13,22 @@ constexpr int kMostPerCall = 32;
 
 }  // namespace
 
-physics::Result<AxesPort> AxesPort::open(const std::string& controller, Counters& counters) {
-  const auto named = [](const physics::Error& error) {
-    return tl::unexpected<physics::Error>(physics::Error(error).with_context("motion.controller"));
-  };
+physics::Result<std::unique_ptr<UdpAxesLink>> UdpAxesLink::open(const std::string& controller,
+                                                                Counters& counters) {
   const auto where = parse_host_port(controller);
-  if (!where) return named(where.error());
+  if (!where) return tl::unexpected(where.error());
   const auto address = resolve(*where, Transport::udp, false);
-  if (!address) return named(address.error());
+  if (!address) return tl::unexpected(address.error());
   const SocketContext context;
   auto socket = UdpSocket::open(context, *address);
-  if (!socket) return named(socket.error());
-  if (auto connected = socket->connect(*address); !connected) return named(connected.error());
-  return AxesPort(std::move(*socket), counters);
+  if (!socket) return tl::unexpected(socket.error());
+  if (auto connected = socket->connect(*address); !connected) {
+    return tl::unexpected(connected.error());
+  }
+  return std::unique_ptr<UdpAxesLink>(new UdpAxesLink(std::move(*socket), counters));
 }
 
-std::optional<protocol::AxesMonitor> AxesPort::receive() noexcept {
+std::optional<protocol::AxesMonitor> UdpAxesLink::receive(std::int64_t /*now_ns*/) noexcept {
   for (int i = 0; i < kMostPerCall; ++i) {
     std::array<std::byte, protocol::kMaxAxesBytes + 1> space;
     const IoResult got = socket_.receive(space);
@@ -39,15 +39,14 @@ std::optional<protocol::AxesMonitor> AxesPort::receive() noexcept {
     if (codec_.decode(std::span(space).first(got.bytes), out) == protocol::AxesFault::none) {
       return out;
     }
-    counters_->add(Counter::axes_reports_refused);
+    counters_.add(Counter::axes_reports_refused);
   }
   return std::nullopt;
 }
 
-void AxesPort::send(const protocol::AxesCommand& command) noexcept {
+void UdpAxesLink::send(const protocol::AxesCommand& command, std::int64_t /*now_ns*/) noexcept {
   const IoResult sent = socket_.send(codec_.encode(command));
-  counters_->add(sent.status == IoStatus::done ? Counter::axes_commands
-                                               : Counter::axes_send_errors);
+  counters_.add(sent.status == IoStatus::done ? Counter::axes_commands : Counter::axes_send_errors);
 }
 
 }  // namespace emit::server

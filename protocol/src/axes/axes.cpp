@@ -3,6 +3,7 @@
 
 #include <google/protobuf/arena.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "emit/physics/check.hpp"
@@ -22,9 +23,13 @@ bool valid_instant(std::int64_t time_ns) noexcept {
   return time_ns >= 0 && time_ns <= kMaxAxesTimeNs;
 }
 
-bool valid(const v1::AxisValues& axis) noexcept {
-  return within(axis.angle_rad(), kMaxAxisRad) && within(axis.rate_rad_s(), kMaxAxisRadS) &&
-         within(axis.acceleration_rad_s2(), kMaxAxisRadS2);
+bool valid(const AxisMotion& axis) noexcept {
+  return within(axis.angle_rad, kMaxAxisRad) && within(axis.rate_rad_s, kMaxAxisRadS) &&
+         within(axis.acceleration_rad_s2, kMaxAxisRadS2);
+}
+
+bool valid(std::span<const AxisMotion> axes) noexcept {
+  return std::ranges::all_of(axes, [](const AxisMotion& axis) { return valid(axis); });
 }
 
 AxisMotion values_of(const v1::AxisValues& axis) noexcept {
@@ -73,6 +78,35 @@ std::string_view to_string(AxesFault fault) noexcept {
       return "value out of range";
   }
   return "unknown fault";
+}
+
+AxesFault check(const AxesCommand& command) noexcept {
+  switch (command.mode) {
+    case AxesMode::off:
+    case AxesMode::park:
+      break;
+    case AxesMode::follow:
+      if (command.count == 0) return AxesFault::axes;
+      break;
+    default:
+      return AxesFault::malformed;
+  }
+  if (command.count > kMaxAxes) return AxesFault::axes;
+  const bool in_range = command.timeout_ms >= 1 && command.timeout_ms <= kMaxAxesTimeoutMs &&
+                        valid_instant(command.time_ns) &&
+                        valid(std::span(command.axes).first(command.count));
+  return in_range ? AxesFault::none : AxesFault::value;
+}
+
+AxesFault check(const AxesMonitor& monitor) noexcept {
+  if (monitor.state < AxesState::motors_off || monitor.state > AxesState::fault) {
+    return AxesFault::malformed;
+  }
+  if (monitor.count > kMaxAxes) return AxesFault::axes;
+  const bool in_range = valid_instant(monitor.time_ns) &&
+                        valid(std::span(monitor.measured).first(monitor.count)) &&
+                        valid(std::span(monitor.demanded).first(monitor.count));
+  return in_range ? AxesFault::none : AxesFault::value;
 }
 
 struct AxesCodec::Impl {
@@ -148,65 +182,50 @@ std::span<const std::byte> AxesCodec::encode(const AxesMonitor& monitor) noexcep
 AxesFault AxesCodec::decode(std::span<const std::byte> bytes, AxesCommand& out) noexcept {
   auto& message = impl_->fresh<v1::AxesCommand>();
   if (const AxesFault fault = impl_->read(bytes, message); fault != AxesFault::none) return fault;
-  if (message.mode() == v1::AxesCommand::MODE_UNSPECIFIED ||
-      !v1::AxesCommand::Mode_IsValid(message.mode())) {
-    return AxesFault::malformed;
-  }
+  if (!v1::AxesCommand::Mode_IsValid(message.mode())) return AxesFault::malformed;
   const auto count = static_cast<std::size_t>(message.axes_size());
-  if (count > kMaxAxes || (count == 0 && message.mode() == v1::AxesCommand::FOLLOW)) {
-    return AxesFault::axes;
-  }
-  bool in_range = message.timeout_ms() >= 1 && message.timeout_ms() <= kMaxAxesTimeoutMs &&
-                  valid_instant(message.time_ns());
-  for (const v1::AxisValues& axis : message.axes()) in_range = in_range && valid(axis);
-  if (!in_range) return AxesFault::value;
-  out = {message.counter(),
-         message.time_ns(),
-         message.sim_time_ns(),
-         message.period_us(),
-         message.timeout_ms(),
-         static_cast<AxesMode>(message.mode()),
-         count,
-         {}};
+  if (count > kMaxAxes) return AxesFault::axes;
+  AxesCommand read = {message.counter(),
+                      message.time_ns(),
+                      message.sim_time_ns(),
+                      message.period_us(),
+                      message.timeout_ms(),
+                      static_cast<AxesMode>(message.mode()),
+                      count,
+                      {}};
   for (std::size_t i = 0; i < count; ++i) {
-    out.axes[i] = values_of(message.axes(static_cast<int>(i)));
+    read.axes[i] = values_of(message.axes(static_cast<int>(i)));
   }
-  return AxesFault::none;
+  const AxesFault fault = check(read);
+  if (fault == AxesFault::none) out = read;
+  return fault;
 }
 
 AxesFault AxesCodec::decode(std::span<const std::byte> bytes, AxesMonitor& out) noexcept {
   auto& message = impl_->fresh<v1::AxesMonitor>();
   if (const AxesFault fault = impl_->read(bytes, message); fault != AxesFault::none) return fault;
-  if (message.state() == v1::AxesMonitor::STATE_UNSPECIFIED ||
-      !v1::AxesMonitor::State_IsValid(message.state())) {
-    return AxesFault::malformed;
-  }
+  if (!v1::AxesMonitor::State_IsValid(message.state())) return AxesFault::malformed;
   const auto count = static_cast<std::size_t>(message.measured_size());
   if (count > kMaxAxes || message.demanded_size() != message.measured_size()) {
     return AxesFault::axes;
   }
-  for (const v1::AxisValues& axis : message.measured()) {
-    if (!valid(axis)) return AxesFault::value;
-  }
-  for (const v1::AxisValues& axis : message.demanded()) {
-    if (!valid(axis)) return AxesFault::value;
-  }
-  if (!valid_instant(message.time_ns())) return AxesFault::value;
-  out = {message.counter(),
-         message.time_ns(),
-         message.command_counter(),
-         static_cast<AxesState>(message.state()),
-         message.limited_axes(),
-         message.faulty_axes(),
-         message.timed_out(),
-         count,
-         {},
-         {}};
+  AxesMonitor read = {message.counter(),
+                      message.time_ns(),
+                      message.command_counter(),
+                      static_cast<AxesState>(message.state()),
+                      message.limited_axes(),
+                      message.faulty_axes(),
+                      message.timed_out(),
+                      count,
+                      {},
+                      {}};
   for (std::size_t i = 0; i < count; ++i) {
-    out.measured[i] = values_of(message.measured(static_cast<int>(i)));
-    out.demanded[i] = values_of(message.demanded(static_cast<int>(i)));
+    read.measured[i] = values_of(message.measured(static_cast<int>(i)));
+    read.demanded[i] = values_of(message.demanded(static_cast<int>(i)));
   }
-  return AxesFault::none;
+  const AxesFault fault = check(read);
+  if (fault == AxesFault::none) out = read;
+  return fault;
 }
 
 }  // namespace emit::protocol
