@@ -2,6 +2,7 @@
 #include "axes/acutrol_host.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <charconv>
 #include <cmath>
 
@@ -28,6 +29,8 @@ constexpr double kParkedRad = 0.01;
 /// Measured axes may be so far, and so late, behind their demands when they begin to follow.
 constexpr double kCapturedRad = 0.02;
 constexpr double kCapturedS = 0.05;
+/// Interlocks may take so long to close.
+constexpr std::int64_t kClosingNs = 5'000'000'000;
 /// Digits of an angle behind the point: 1e-6 degrees are 0.004 arcsec.
 constexpr int kDigits = 6;
 
@@ -63,7 +66,7 @@ void AcutrolHost::start() noexcept {
   starting_ = false;
   off_done_ = off_bad_ = off_by_host_ = false;
   off_left_ = 0;
-  powered_ = measured_once_ = false;
+  started_ = powered_ = measured_once_ = false;
   known_interlocks_ = 0;
   ready_.reset();
   if (state_ != AxesState::fault) state_ = AxesState::motors_off;
@@ -120,7 +123,7 @@ void AcutrolHost::add_off() noexcept {
   }
   off_by_host_ = std::exchange(off_wanted_, false);
   off_bad_ = false;
-  powered_ = starting_ = false;
+  powered_ = started_ = starting_ = false;
 }
 
 void AcutrolHost::add_start() noexcept {
@@ -176,7 +179,8 @@ std::string_view AcutrolHost::lines(const protocol::AxesCommand& command,
     add_off();
   } else if (!off && !fault && powered_) {
     plan(command, now_ns);
-  } else if (!off && !fault && measured_once_ && known_interlocks_ == bit(axes_.size()) - 1) {
+  } else if (!off && !fault && !started_ && measured_once_ &&
+             known_interlocks_ == bit(axes_.size()) - 1) {
     add_start();
   }
   add_reads(powered_);
@@ -275,9 +279,11 @@ void AcutrolHost::answer_to_read(const Expected& to, const AcutrolAnswer& answer
 void AcutrolHost::answer_to_interlock(std::size_t axis, AcutrolAnswer::Kind kind,
                                       std::string_view line) noexcept {
   using Kind = AcutrolAnswer::Kind;
+  closed_interlocks_ &= ~bit(axis);
   switch (kind) {
     case Kind::closed:
       known_interlocks_ |= bit(axis);
+      closed_interlocks_ |= bit(axis);
       break;
     case Kind::open:
       known_interlocks_ |= bit(axis);
@@ -309,7 +315,7 @@ void AcutrolHost::lose_order() noexcept {
 
 void AcutrolHost::fail(std::size_t axis, std::string_view line) noexcept {
   faulty_axes_ |= bit(axis);
-  powered_ = starting_ = false;
+  powered_ = started_ = starting_ = false;
   if (state_ == AxesState::fault) return;
   state_ = AxesState::fault;
   off_done_ = false;
@@ -326,13 +332,12 @@ void AcutrolHost::end_off() noexcept {
 }
 
 void AcutrolHost::end_round(std::int64_t now_ns) noexcept {
-  if (std::exchange(starting_, false) && !round_is_bad_) {
-    powered_ = true;
-    state_ = AxesState::parking;
-    planned_ns_ = now_ns;
-    for (std::size_t i = 0; i < axes_.size(); ++i) profiles_[i].start(demanded_[i].angle_rad);
-  }
   const unsigned all = bit(axes_.size()) - 1;
+  if (std::exchange(starting_, false) && !round_is_bad_) {
+    started_ = true;
+    started_ns_ = now_ns;
+  }
+  if (started_ && !powered_) power_on(all, now_ns);
   if (round_is_bad_ || positions_ != all || rates_ != all) return;
   measured_ = fresh_;
   measured_once_ = true;
@@ -347,6 +352,20 @@ void AcutrolHost::end_round(std::int64_t now_ns) noexcept {
                                  axes_.size(),
                                  measured_,
                                  demanded_};
+}
+
+void AcutrolHost::power_on(unsigned all, std::int64_t now_ns) noexcept {
+  if (closed_interlocks_ != all) {
+    // Drives take their time to be enabled.
+    if (now_ns - started_ns_ > kClosingNs) {
+      fail(static_cast<std::size_t>(std::countr_one(closed_interlocks_)), "interlock stays open");
+    }
+    return;
+  }
+  powered_ = true;
+  state_ = AxesState::parking;
+  planned_ns_ = now_ns;
+  for (std::size_t i = 0; i < axes_.size(); ++i) profiles_[i].start(demanded_[i].angle_rad);
 }
 
 void AcutrolHost::note_arrival() noexcept {

@@ -102,6 +102,8 @@ class AcutrolHost {
   void end_off() noexcept;
   /// Ends a round when all of its lines are answered.
   void end_round(std::int64_t now_ns) noexcept;
+  /// Looks whether the interlocks have closed after a start.
+  void power_on(unsigned all, std::int64_t now_ns) noexcept;
   void note_arrival() noexcept;
 
   std::vector<Axis> axes_;
@@ -122,7 +124,7 @@ class AcutrolHost {
   std::int64_t read_ns_ = 0;  ///< when the latest measured number arrived
   std::uint64_t command_counter_ = 0;
   bool round_is_bad_ = false;  ///< an answer was refused
-  bool starting_ = false;      ///< it switches the motors on
+  bool starting_ = false;      ///< it asks the motors to be switched on
   unsigned positions_ = 0;     ///< bit i: the angle of axis i was read
   unsigned rates_ = 0;
   std::array<AxisMotion, kMaxAxes> fresh_{};
@@ -135,7 +137,10 @@ class AcutrolHost {
   std::size_t off_left_ = 0;  ///< lines that wait
 
   protocol::AxesState state_ = protocol::AxesState::motors_off;
-  bool powered_ = false;            ///< interlocks are closed, and the axes are in position mode
+  bool started_ = false;         ///< the motors were asked to be on; interlocks may still be open
+  std::int64_t started_ns_ = 0;  ///< when that was answered
+  bool powered_ = false;         ///< all interlocks are closed since then
+  unsigned closed_interlocks_ = 0;  ///< bit i: the interlock of axis i was closed when it was read
   bool measured_once_ = false;      ///< measured_ are of this connection
   unsigned known_interlocks_ = 0;   ///< bit i: the interlock of axis i was read
   std::size_t next_interlock_ = 0;  ///< axis whose interlock is read next

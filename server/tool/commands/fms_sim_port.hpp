@@ -16,9 +16,9 @@ namespace emit::tool {
 
 /// Counts of what a simulated controller took, lost and did.
 struct FmsSimFigures {
-  std::uint64_t commands = 0;
-  std::uint64_t missing = 0;  ///< gaps of the commands' counter
-  std::uint64_t dropped = 0;  ///< older than the latest one, or for another number of axes
+  std::uint64_t commands = 0;  ///< lines where they are ACUTROL commands
+  std::uint64_t missing = 0;   ///< gaps of the commands' counter
+  std::uint64_t dropped = 0;   ///< older than the latest one, or for another number of axes
   std::uint64_t malformed = 0;
   std::uint64_t torn = 0;  ///< looks at memory while the host wrote
   std::uint64_t timeouts = 0;

@@ -25,6 +25,7 @@ using protocol::AxesMode;
 using protocol::AxesMonitor;
 using protocol::AxesState;
 using test::kMs;
+using test::kSecondNs;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -184,6 +185,29 @@ TEST_F(AcutrolHostTest, a_fault_that_lasts_comes_back_after_the_host_has_switche
   run(AxesMode::off, 3);
   const AxesMonitor monitor = run(AxesMode::follow, 3000, -1.5);
   EXPECT_EQ(monitor.state, AxesState::fault);
+}
+
+TEST_F(AcutrolHostTest, waits_for_interlocks_that_close_slowly_but_not_for_ever) {
+  for (const bool closes : {true, false}) {
+    host_->start();
+    lines(AxesMode::park);
+    take("1\n0\n1\n0\nOpen\nOpen\n");
+    lines(AxesMode::park);
+    take("OK\nOK\nOK\nOK\nOK\nOK\n1\n0\n1\n0\nClose\nOpen\n");
+    for (int i = 0; i < 40; ++i) {
+      now_ns_ += 100 * kMs;
+      EXPECT_THAT(lines(AxesMode::park), Not(HasSubstr(":D:P"))) << "the axes stay";
+      const auto monitor = take("1\n0\n1\n0\nClose\nOpen\n");
+      ASSERT_TRUE(monitor.has_value());
+      EXPECT_EQ(monitor->state, AxesState::motors_off);
+    }
+    now_ns_ += closes ? kMs : 2 * kSecondNs;
+    lines(AxesMode::park);
+    const auto monitor = take(closes ? "1\n0\n1\n0\nClose\nClose\n" : "1\n0\n1\n0\nClose\nOpen\n");
+    ASSERT_TRUE(monitor.has_value());
+    EXPECT_EQ(monitor->state, closes ? AxesState::parking : AxesState::fault);
+    EXPECT_EQ(monitor->faulty_axes, closes ? 0U : 2U);
+  }
 }
 
 TEST_F(AcutrolHostTest, an_error_switches_all_motors_off_and_names_the_axis) {

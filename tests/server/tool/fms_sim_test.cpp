@@ -7,7 +7,9 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <filesystem>
 #include <functional>
+#include <span>
 #include <string>
 #include <thread>
 
@@ -16,6 +18,7 @@
 #include "rt/clock.hpp"
 #include "support/daemon_process.hpp"
 #include "support/emit_process.hpp"
+#include "support/times.hpp"
 
 namespace emit::test {
 namespace {
@@ -78,15 +81,15 @@ class FmsHost {
   std::uint64_t last_counter_ = 0;
 };
 
-/// Returns the address that a simulator prints when it is ready; "" when it does not.
-std::string address_of(const ToolProcess& simulator) {
+/// Returns the place that a simulator prints when it is ready; "" when it does not.
+std::string address_of(const ToolProcess& simulator, const std::string& key = "axes_udp") {
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
   std::string said;
   while (said.find('\n') == std::string::npos && std::chrono::steady_clock::now() < end) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
     said = simulator.out();
   }
-  const std::string ready = "ready axes_udp=";
+  const std::string ready = "ready " + key + "=";
   if (said.rfind(ready, 0) != 0) return "";
   return said.substr(ready.size(), said.find('\n') - ready.size());
 }
@@ -128,6 +131,69 @@ TEST(CliFmsSim, an_axis_that_runs_away_opens_the_interlock) {
   EXPECT_TRUE(host.wait(AxesMode::follow, [](const AxesMonitor& monitor) {
     return monitor.state == AxesState::fault && monitor.faulty_axes == 2;
   }));
+}
+
+/// Lines by hand, as a terminal would send them.
+TEST(CliFmsSim, answers_acutrol_lines_and_turns_an_axis) {
+  ScratchFolder folder;
+  ToolProcess simulator(folder, "fms", {"fms-sim", "--acutrol", "127.0.0.1:0", "--axes", "1"});
+  const std::string address = address_of(simulator, "axes_acutrol");
+  ASSERT_NE(address, "") << simulator.err();
+  const server::SocketContext context;
+  const auto target =
+      server::resolve(*server::parse_host_port(address), server::Transport::tcp, false);
+  auto host = server::TcpSocket::connect(context, *target, kLongNs);
+  ASSERT_TRUE(host.has_value());
+  const auto ask = [&](const std::string& line) {
+    EXPECT_EQ(host->write_some(std::as_bytes(std::span(line + "\n"))).bytes, line.size() + 1);
+    std::string answer;
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (answer.find('\n') == std::string::npos && std::chrono::steady_clock::now() < end) {
+      std::array<char, 256> space;
+      const auto got = host->read_some(std::as_writable_bytes(std::span(space)));
+      if (got.status == server::IoStatus::done) answer.append(space.data(), got.bytes);
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return answer;
+  };
+  EXPECT_EQ(ask(":interlock? 1"), "ACUTROL Open\r\n");
+  EXPECT_EQ(ask(":D:P 1, 0"), "ACUTROL OK\r\n");
+  EXPECT_EQ(ask(":mode:position 1"), "ACUTROL OK\r\n");
+  EXPECT_EQ(ask(":interlock:close 1"), "ACUTROL OK\r\n");
+  EXPECT_EQ(ask(":demand:position 1, 10.0"), "ACUTROL OK\r\n");
+  double degrees = 0.0;
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  while (std::abs(degrees - 10.0) > 0.01 && std::chrono::steady_clock::now() < end) {
+    degrees = std::stod("0" + ask(":R:P 1").substr(8));
+  }
+  EXPECT_NEAR(degrees, 10.0, 0.01);
+  EXPECT_EQ(ask(":interlock? 1"), "ACUTROL Close\r\n");
+  EXPECT_THAT(ask(":R:P 2"), HasSubstr("ERROR"));
+  EXPECT_EQ(ask(":interlock:open 1"), "ACUTROL OK\r\n");
+  simulator.signal(SIGINT);
+  EXPECT_EQ(simulator.wait(), 0) << simulator.err();
+  EXPECT_THAT(simulator.err(), HasSubstr("fms-sim: following"));
+  EXPECT_THAT(simulator.out(), HasSubstr("1 malformed"));
+}
+
+TEST(CliFmsSim, makes_its_memory_and_refuses_wrong_places) {
+  ScratchFolder folder;
+  const ProcessResult made =
+      run_emit({"fms-sim", "--memory", folder.file("axes") + "@0x40", "--seconds", "0.05"});
+  EXPECT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_THAT(made.out, HasSubstr("ready axes_memory=" + folder.file("axes") + "@64"));
+  EXPECT_EQ(std::filesystem::file_size(folder.file("axes")), 64U + 552U);
+  const ProcessResult small =
+      run_emit({"fms-sim", "--memory", folder.file("axes") + "@72", "--seconds", "0.05"});
+  EXPECT_EQ(small.exit_code, 1);
+  EXPECT_THAT(small.err, HasSubstr("has 616 bytes, and the axes need 624"));
+  for (const char* place : {"axes@0", "/dev/shm/axes", "/dev/shm/axes@4"}) {
+    const ProcessResult result = run_emit({"fms-sim", "--memory", place, "--seconds", "0.05"});
+    EXPECT_EQ(result.exit_code, 2) << place;
+    EXPECT_THAT(result.err, HasSubstr(place)) << place;
+  }
+  EXPECT_EQ(run_emit({"fms-sim", "--acutrol", "127.0.0.1:0", "--memory", "/x@0"}).exit_code, 2);
+  EXPECT_EQ(run_emit({"fms-sim", "--acutrol", "nowhere", "--seconds", "0.05"}).exit_code, 2);
 }
 
 TEST(CliFmsSim, refuses_faults_that_name_no_axis) {
