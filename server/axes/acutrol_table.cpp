@@ -18,7 +18,7 @@ using protocol::AxesState;
 /// Header of every answer. A driver for a real controller skips 8 characters.
 constexpr std::string_view kHeader = "ACUTROL ";
 constexpr std::string_view kLineEnd = "\r\n";
-/// Demands are continued for so long, and no rate is made of two that are farther apart.
+/// No rate is made of two demands that are farther apart, and none is continued for longer.
 constexpr double kLongestGapS = 0.05;
 constexpr std::uint32_t kSilenceMs = protocol::kMaxAxesTimeoutMs;
 
@@ -142,7 +142,10 @@ std::string_view AcutrolTable::answer(std::string_view verb, std::size_t axis,
 void AcutrolTable::demand(Axis& axis, double demand_rad, std::int64_t now_ns) noexcept {
   const double gap_s = 1e-9 * static_cast<double>(now_ns - axis.demand_ns);
   const bool goes_on = axis.demanded && gap_s > 0.0 && gap_s <= kLongestGapS;
-  axis.rate_rad_s = goes_on ? (demand_rad - axis.demand_rad) / gap_s : 0.0;
+  // Far demands one after the other are no motion that an axis could have.
+  const double rate_rad_s = goes_on ? (demand_rad - axis.demand_rad) / gap_s : 0.0;
+  axis.rate_rad_s = std::abs(rate_rad_s) <= protocol::kMaxAxisRadS ? rate_rad_s : 0.0;
+  axis.gap_s = goes_on ? gap_s : 0.0;
   axis.demand_rad = demand_rad;
   axis.demand_ns = now_ns;
   axis.demanded = true;
@@ -153,10 +156,13 @@ const protocol::AxesCommand& AcutrolTable::command(std::int64_t now_ns) noexcept
   for (std::size_t i = 0; i < count_; ++i) {
     const Axis& axis = axes_[i];
     follow = follow && axis.in_position_mode && axis.closed && axis.demanded;
+    // A demand is continued until two more were due, and stands as it is when none comes.
     const double since_s = 1e-9 * static_cast<double>(now_ns - axis.demand_ns);
-    const double on_s = std::clamp(since_s, 0.0, kLongestGapS);
-    const double rate_rad_s = since_s <= kLongestGapS ? axis.rate_rad_s : 0.0;
-    command_.axes[i] = {axis.demand_rad + axis.rate_rad_s * on_s, rate_rad_s, 0.0};
+    const bool goes_on = since_s <= 2.0 * axis.gap_s;
+    const double on_s = since_s <= kLongestGapS ? std::clamp(since_s, 0.0, 2.0 * axis.gap_s) : 0.0;
+    const double angle_rad = std::clamp(axis.demand_rad + axis.rate_rad_s * on_s,
+                                        -protocol::kMaxAxisRad, protocol::kMaxAxisRad);
+    command_.axes[i] = {angle_rad, goes_on ? axis.rate_rad_s : 0.0, 0.0};
   }
   command_.mode = follow ? AxesMode::follow : AxesMode::off;
   ++command_.counter;

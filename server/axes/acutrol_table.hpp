@@ -12,8 +12,8 @@ namespace emit::server {
 /// Controller's side of the ACUTROL command language, for a simulated motion simulator: it answers
 /// lines, and makes the commands of a TableSimulator of them. All axes follow when each of them is
 /// in position mode and has its interlock closed; else all motors are off. Between two demands an
-/// axis goes on with their difference, for at most 50 ms. The host may be silent for ever: the axes
-/// then stay where they are.
+/// axis goes on with the rate of the latest two. The host may be silent for ever: the axes then
+/// stay at the latest demand.
 ///
 /// Understood, in small or capital letters: `:M:P i`, `:mode:position i`, `:mode:off i`, `:D:P
 /// i,deg`, `:demand:position i,deg`, `:R:P i`, `:R:R i`, `:read:position i`, `:read:rate i`,
@@ -41,6 +41,7 @@ class AcutrolTable {
   struct Axis {
     double demand_rad = 0.0;
     double rate_rad_s = 0.0;     ///< difference of the latest two demands
+    double gap_s = 0.0;          ///< time between them
     std::int64_t demand_ns = 0;  ///< when the latest one came
     bool demanded = false;       ///< since the axis is in position mode
     bool in_position_mode = false;

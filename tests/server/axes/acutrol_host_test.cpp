@@ -366,7 +366,13 @@ TEST(AcutrolTable, goes_on_between_demands_and_rests_when_they_stop) {
   EXPECT_NEAR(command.axes[0].angle_rad, 11.5 * kDegree, 1e-9);
   EXPECT_NEAR(command.axes[0].rate_rad_s, 100.0 * kDegree, 1e-9);
   static_cast<void>(table.command(200 * kMs));
-  EXPECT_NEAR(command.axes[0].angle_rad, 16.0 * kDegree, 1e-9);
+  EXPECT_NEAR(command.axes[0].angle_rad, 11.0 * kDegree, 1e-9);
+  EXPECT_EQ(command.axes[0].rate_rad_s, 0.0);
+  // A leap within a millisecond gives no rate.
+  static_cast<void>(table.answer(":D:P 1,-5e7", 201 * kMs));
+  static_cast<void>(table.answer(":D:P 1,5e7", 202 * kMs));
+  static_cast<void>(table.command(203 * kMs));
+  EXPECT_EQ(protocol::check(command), protocol::AxesFault::none);
   EXPECT_EQ(command.axes[0].rate_rad_s, 0.0);
 }
 

@@ -144,8 +144,9 @@ TEST(CliFmsSim, answers_acutrol_lines_and_turns_an_axis) {
       server::resolve(*server::parse_host_port(address), server::Transport::tcp, false);
   auto host = server::TcpSocket::connect(context, *target, kLongNs);
   ASSERT_TRUE(host.has_value());
-  const auto ask = [&](const std::string& line) {
-    EXPECT_EQ(host->write_some(std::as_bytes(std::span(line + "\n"))).bytes, line.size() + 1);
+  const auto ask = [&](const std::string& command) {
+    const std::string line = command + "\n";
+    EXPECT_EQ(host->write_some(std::as_bytes(std::span(line))).bytes, line.size());
     std::string answer;
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     while (answer.find('\n') == std::string::npos && std::chrono::steady_clock::now() < end) {

@@ -141,11 +141,12 @@ struct Way {
 };
 
 TEST(MotionRun, memory_and_acutrol_commands_do_the_same) {
-  ScratchFolder folder;
+  const ScratchFolder shared;
   for (const Way& way :
-       {Way{"--memory", folder.file("axes") + "@128", "axes_memory", "memory:", "rate_hz = 1000"},
+       {Way{"--memory", shared.file("axes") + "@128", "axes_memory", "memory:", "rate_hz = 1000"},
         Way{"--acutrol", "127.0.0.1:0", "axes_acutrol", "acutrol:", "rate_hz = 100"}}) {
     SCOPED_TRACE(way.option);
+    ScratchFolder folder;
     ToolProcess table(folder, "fms" + way.option,
                       {"fms-sim", way.option, way.place, "--axes", "3"});
     const std::string controller = start_table(table, way.key);
