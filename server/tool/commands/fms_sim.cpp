@@ -21,7 +21,7 @@
 #include "rt/clock.hpp"
 #include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
-#include "tool/commands/fms_sim_port.hpp"
+#include "tool/fms_sim/fms_sim_port.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tool/commands/fms_sim_port.hpp"
+#include "tool/fms_sim/fms_sim_port.hpp"
 
 #include <fmt/format.h>
 #include <sys/socket.h>
