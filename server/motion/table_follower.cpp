@@ -326,9 +326,11 @@ const protocol::AxesCommand& TableFollower::step(std::int64_t now_ns) noexcept {
   const std::int64_t time_ns = now_ns + options_.period_ns;
   watch_clock(now_ns);
   choose(now_ns);
-  // A controller takes only counters above that of an earlier process.
-  command_.counter = std::max(command_.counter + 1,
-                              static_cast<std::uint64_t>(std::max<std::int64_t>(now_ns, 0) / 1000));
+  // Commands count up by one, from above the last counter of an earlier process: a controller takes
+  // no other.
+  command_.counter = command_.counter != 0
+                         ? command_.counter + 1
+                         : static_cast<std::uint64_t>(std::max<std::int64_t>(now_ns / 1000, 1));
   command_.time_ns = time_ns;
   command_.sim_time_ns = clock_.empty() ? 0 : clock_.sim_time_ns(time_ns);
   if (command_.mode == AxesMode::follow) {

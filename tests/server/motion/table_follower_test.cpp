@@ -385,7 +385,10 @@ TEST_F(TableFollowerTest, refuses_measurements_of_another_table_or_of_before) {
 
 TEST_F(TableFollowerTest, counts_commands_above_those_of_an_earlier_process) {
   run(10 * kMs);
-  const std::uint64_t earlier = follower_->step(now_ns_).counter;
+  const std::uint64_t before = follower_->step(now_ns_).counter;
+  // A gap in the numbers is a command that got lost.
+  const std::uint64_t earlier = follower_->step(now_ns_ + 50 * kMs).counter;
+  EXPECT_EQ(earlier, before + 1);
   const auto unit = ThreeAxisGimbal::create({GimbalAxis::yaw, GimbalAxis::pitch, GimbalAxis::roll});
   TableFollower::Options options(MotionTable(*unit, std::nullopt, {}));
   options.axes.assign(3, {{-1.0, 1.0, 1.0, 1.0}, 0.0});
