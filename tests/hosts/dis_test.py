@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """A DIS sender and a flight dynamics model, written from the published layouts alone."""
+import json
 import math
+import os
 import pathlib
+import shutil
 import socket
 import struct
+import subprocess
 import tempfile
 import time
 import unittest
@@ -61,6 +65,71 @@ def entity_state(version, exercise, identity, elapsed_s, place_ecef, velocity_ec
     return struct.pack(">BBBBIHH 3HBB 8B8B 3f3d3f IB15s 3f3f B11sI", version, exercise, 1, 1, stamp & 0xffffffff, 144, 0,
                        *identity, 1, 0, *([0] * 16), *velocity_ecef, *place_ecef, *euler, 0, model, bytes(15), 0, 0, 0, 0, 0,
                        0, 1, b"target", 0)
+
+
+def node_modules():
+    """Returns the folder of the packages for Node.js that tests use; None where they are missing."""
+    cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    folder = pathlib.Path(os.environ.get("EMIT_PEERS_DIR") or f"{cache}/emit/peers") / "node_modules"
+    return folder if (folder / "open-dis" / "package.json").exists() and shutil.which("node") else None
+
+
+def by_open_dis(version, states):
+    """Returns the PDUs of these arguments of entity_state(), encoded by open-dis."""
+    lines = []
+    for exercise, identity, elapsed_s, place, velocity, euler in states:
+        lines.append(json.dumps({
+            "exercise": exercise, "timestamp": (round(elapsed_s * UNITS_PER_S) % 2**31) << 1, "id": identity,
+            "location": dict(zip("xyz", place)), "velocity": dict(zip("xyz", velocity)),
+            "orientation": dict(zip(("psi", "theta", "phi"), euler))}))
+    program = pathlib.Path(__file__).parent / "peers" / "encode_dis.js"
+    done = subprocess.run(["node", program, node_modules(), str(version)], input="\n".join(lines), capture_output=True,
+                          text=True, timeout=60, check=True)
+    return [bytes.fromhex(line) for line in done.stdout.split()]
+
+
+class OpenDis(unittest.TestCase):
+    def test_entities_move_by_pdus_of_another_program(self):
+        if node_modules() is None:
+            self.skipTest("Node.js or open-dis is missing: install_deps.sh --with-peers installs it")
+        for version in (6, 7):
+            with self.subTest(version=version):
+                self.fly(version)
+
+    def fly(self, version):
+        world = World(*ORIGIN)
+        # The nose points to the north, and the flight goes there.
+        euler = euler_of(((1, 0, 0), (0, 1, 0), (0, 0, 1)), *ORIGIN[:2])
+        velocity = [SPEED_M_S * world.axes[1][i] for i in range(3)]
+        states = []
+        for step in range(31):
+            elapsed_s = 0.05 * step
+            place = [o + 1000.0 * u + elapsed_s * v for o, u, v in zip(world.origin, world.axes[2], velocity)]
+            states.append((3, (1, 2, 9), elapsed_s, place, velocity, euler))
+        pdus = by_open_dis(version, states)
+        self.assertEqual(len(pdus), len(states))
+        listen = free_port()
+        more = f'[dis]\nlisten = "127.0.0.1:{listen}"\nexercise = 3\nseeker = "1:2:9"\n[metrics]\nlisten = "127.0.0.1:0"\n'
+        with Daemon(16, 12, pacing='mode = "ig-clock"\nrate_hz = 100.0', more=more, head=scenario(self)) as daemon, \
+                socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            client = FrameClient.connect(daemon.tcp_url)
+            self.addCleanup(client.close)
+            client.subscribe()
+            headers = []
+            begin_s = time.monotonic()
+            for step, pdu in enumerate(pdus):
+                sender.sendto(pdu, ("127.0.0.1", listen))
+                while time.monotonic() < begin_s + 0.05 * (step + 1):
+                    headers.append(client.receive(20.0).header)
+            self.assertEqual(counter(daemon, "gateway_messages_refused"), 0)
+        moved = [header for header in headers if header.position_m[2] > 900.0]
+        self.assertGreater(len(moved), 100)
+        lead = [header.position_m[1] - SPEED_M_S * header.sim_time_ns * 1e-9 for header in moved][40:]
+        self.assertLess(max(lead) - min(lead), 1.0, "8 ms of flight")
+        for header in moved:
+            self.assertAlmostEqual(header.position_m[0], 0.0, delta=0.01)
+            w, x, y, z = header.world_from_body
+            self.assertAlmostEqual(2.0 * (x * y + w * z), 1.0, delta=1e-5)  # the nose's part to the north
 
 
 class Exercise(unittest.TestCase):
