@@ -120,6 +120,10 @@ void check_dis(const Node& table, const DisConfig& dis, Diagnostics& diagnostics
   }
   for (std::size_t i = 0; i < dis.entities.size(); ++i) {
     check_id("entities", dis.entities[i].id);
+    if (dis.entities[i].id == dis.seeker) {
+      diagnostics.add(key_location(table, "entities"),
+                      fmt::format("'entities': {} is the seeker", dis.seeker));
+    }
     for (std::size_t k = 0; k < i; ++k) {
       const bool same_id = dis.entities[i].id == dis.entities[k].id;
       if (!same_id && dis.entities[i].entity != dis.entities[k].entity) continue;

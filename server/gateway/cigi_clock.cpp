@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gateway/cigi_clock.hpp"
 
+#include "emit/protocol/codec.hpp"
+
 namespace emit::server {
 namespace {
 
 /// Messages in a row that count up by one from an old number: nobody overtakes so many.
 constexpr std::uint32_t kStraysOfRestart = 8;
+
+/// Longest step of time between two messages: three years.
+constexpr std::int64_t kLongestStepNs = 100'000'000'000'000'000;
 
 /// Returns how far `to` is ahead of `from`, for numbers that wrap.
 std::int32_t ahead(std::uint32_t from, std::uint32_t to) noexcept {
@@ -36,11 +41,13 @@ CigiClock::Verdict CigiClock::take(const protocol::cigi::IgControl& control) noe
       return strays_ >= kStraysOfRestart ? Verdict::restart : Verdict::old;
     }
     // A time stamp counts from the latest one. Where there was none since, the frames do.
-    if (control.timestamp_valid && has_ticks_) {
-      time_ns_ += std::int64_t{ticks} * protocol::cigi::kTimestampTickNs;
-    } else {
-      time_ns_ += std::int64_t{frames} * period_ns_;
+    const bool by_stamp = control.timestamp_valid && has_ticks_;
+    if (!by_stamp && period_ns_ > 0 && frames > kLongestStepNs / period_ns_) {
+      return Verdict::restart;
     }
+    time_ns_ += by_stamp ? std::int64_t{ticks} * protocol::cigi::kTimestampTickNs
+                         : std::int64_t{frames} * period_ns_;
+    if (time_ns_ > protocol::kMaxSimTimeNs) return Verdict::restart;
     number_ += static_cast<std::uint32_t>(frames);
   } else {
     number_ = control.host_frame;

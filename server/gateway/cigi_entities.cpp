@@ -60,14 +60,18 @@ void CigiEntities::clear() noexcept {
   entities_.clear();
   places_->fill(kNone);
   next_ = 0;
+  time_ns_ = 0;
   carrier_ = options_.seeker;
   view_offset_body_m_ = glm::dvec3(0.0);
   view_yaw_pitch_roll_rad_ = glm::dvec3(0.0);
   if (scene_ != nullptr) scene_->reset();
 }
 
-void CigiEntities::mark_all() noexcept {
-  for (Entity& entity : entities_) entity.marked = entity.jumps = true;
+void CigiEntities::mark_all(bool jump) noexcept {
+  for (Entity& entity : entities_) {
+    entity.marked = true;
+    entity.jumps |= jump;
+  }
 }
 
 CigiEntities::Entity* CigiEntities::find(std::uint16_t id) noexcept {
@@ -86,13 +90,23 @@ CigiEntities::Entity* CigiEntities::find_or_make(std::uint16_t id) noexcept {
   Entity& entity = entities_.emplace_back();
   entity.id = entity.control.entity_id = id;
   entity.scenario_id = id;
+  bool mapped = false;
+  bool taken = false;  // another number of the host stands for this entity
   for (const auto& [host_id, scenario_id] : options_.entities) {
     if (host_id == id) entity.scenario_id = scenario_id;
+    mapped |= host_id == id;
+    taken |= scenario_id == id;
   }
   // The carrier of the sensor need not be seen, and 0 means scenery in a scenario.
-  entity.known = entity.scenario_id != 0 && options_.known(entity.scenario_id);
+  entity.known =
+      entity.scenario_id != 0 && (mapped || !taken) && options_.known(entity.scenario_id);
   entity.told = entity.known || id == carrier_;
   return &entity;
+}
+
+void CigiEntities::shift(std::int64_t by_ns) noexcept {
+  time_ns_ += by_ns;
+  for (Entity& entity : entities_) entity.time_ns += by_ns;
 }
 
 bool CigiEntities::take(const cigi::EntityControl& packet) noexcept {
@@ -103,7 +117,11 @@ bool CigiEntities::take(const cigi::EntityControl& packet) noexcept {
       entity->control.parent_id != packet.parent_id) {
     entity->jumps = true;
   }
+  if (packet.state == cigi::EntityState::destroyed) entity->rates.reset();
   entity->control = packet;
+  entity->time_ns = time_ns_;
+  entity->way_world_m = glm::dvec3(0.0);
+  entity->turn_body = glm::dquat(1.0, 0.0, 0.0, 0.0);
   entity->has_place = entity->changed = true;
   return true;
 }
@@ -125,17 +143,17 @@ bool CigiEntities::take(const cigi::EntityPosition& packet) noexcept {
 bool CigiEntities::take(const cigi::EntityControl40& packet) noexcept {
   Entity* entity = find_or_make(packet.entity_id);
   if (entity == nullptr) return false;
-  const bool has_place = entity->has_place;
-  cigi::EntityControl whole = entity->control;
-  whole.state = packet.state;
-  static_cast<void>(take(whole));
-  entity->has_place = has_place;
+  if (entity->control.state != packet.state) entity->jumps = true;
+  if (packet.state == cigi::EntityState::destroyed) entity->rates.reset();
+  entity->control.state = packet.state;
+  entity->changed = true;
   return true;
 }
 
 bool CigiEntities::take(const cigi::RateControl& packet) noexcept {
   Entity* entity = find(packet.entity_id);
-  if (entity == nullptr || packet.applies_to_part) return false;
+  if (entity == nullptr || packet.applies_to_part || entity->control.attached) return false;
+  move_on(*entity);
   entity->rates = packet;
   entity->changed = true;
   return true;
@@ -156,7 +174,32 @@ bool CigiEntities::take(const cigi::ViewControl& packet) noexcept {
   return true;
 }
 
+void CigiEntities::move_on(Entity& entity) noexcept {
+  const Pose from = said_pose(entity);
+  const Pose to = pose_on_earth(entity);
+  entity.way_world_m = to.position_world_m - from.position_world_m;
+  entity.turn_body = glm::normalize(glm::conjugate(from.world_from_body) * to.world_from_body);
+  entity.time_ns = time_ns_;
+}
+
 Pose CigiEntities::pose_on_earth(const Entity& entity) const noexcept {
+  Pose pose = said_pose(entity);
+  pose.position_world_m += entity.way_world_m;
+  pose.world_from_body = glm::normalize(pose.world_from_body * entity.turn_body);
+  if (!is_moving(entity)) return pose;
+  const auto rates = rates_of(entity, pose);
+  if (!rates) return pose;
+  const double for_s = 1e-9 * static_cast<double>(time_ns_ - entity.time_ns);
+  pose.position_world_m += rates->velocity_world_m_s * for_s;
+  const glm::dvec3 turn_rad = rates->angular_rate_body_rad_s * for_s;
+  if (const double angle_rad = glm::length(turn_rad); angle_rad > 0.0) {
+    pose.world_from_body =
+        glm::normalize(pose.world_from_body * glm::angleAxis(angle_rad, turn_rad / angle_rad));
+  }
+  return pose;
+}
+
+Pose CigiEntities::said_pose(const Entity& entity) const noexcept {
   const cigi::EntityControl& control = entity.control;
   const physics::HeadingPitchRoll attitude = {
       control.yaw_deg * kDegree, control.pitch_deg * kDegree, control.roll_deg * kDegree};
@@ -245,7 +288,7 @@ std::optional<protocol::PoseRates> CigiEntities::rates_of(const Entity& entity,
 bool CigiEntities::has_moved(const Entity& entity) const noexcept {
   const Entity* link = &entity;
   for (int parents = 0; parents <= kMaxParents; ++parents) {
-    if (link->changed) return true;
+    if (link->changed || is_moving(*link)) return true;
     if (!link->control.attached) return false;
     link = find(link->control.parent_id);
     if (link == nullptr) return false;
@@ -273,7 +316,17 @@ void CigiEntities::fill(protocol::HostFrameData& frame) noexcept {
       carrier != nullptr && view_offset_body_m_ == zero && view_yaw_pitch_roll_rad_ == zero) {
     frame.seeker_rates = rates_of(*carrier, frame.seeker);
   }
-  for (Entity& entity : entities_) entity.marked |= has_moved(entity);
+  // Three poses in a row at one place tell the prediction that an entity stands.
+  constexpr int kRepeats = 3;
+  for (Entity& entity : entities_) {
+    if (has_moved(entity)) {
+      entity.marked = true;
+      entity.repeats = options_.predicted ? kRepeats : 0;
+    } else if (entity.repeats > 0) {
+      entity.marked = true;
+      --entity.repeats;
+    }
+  }
   for (Entity& entity : entities_) entity.changed = false;
   frame.entity_count = 0;
   const std::size_t count = entities_.size();

@@ -32,6 +32,9 @@ class CigiEntities {
   struct Options {
     std::uint16_t seeker = 0;  ///< entity that carries the sensor until View Control says otherwise
     std::uint16_t view = 0;    ///< view that is the sensor
+    /// A frame shows where things are by then, so that an entity which the host does not send again
+    /// has to be said to stand.
+    bool predicted = false;
     /// Entities of the host with their number in the scenario. Others have the same number there.
     std::vector<std::pair<std::uint16_t, std::uint32_t>> entities;
     /// Says whether the scenario has an entity.
@@ -43,7 +46,12 @@ class CigiEntities {
   /// Forgets every entity, and the offsets of the view.
   void clear() noexcept;
   /// Marks every entity, so that the next frames carry all of them.
-  void mark_all() noexcept;
+  /// @param jump  also says that they are there at once
+  void mark_all(bool jump) noexcept;
+  /// Moves on to the simulation time of the next packets. Entities with rates move with it.
+  void set_time(std::int64_t time_ns) noexcept { time_ns_ = time_ns; }
+  /// Shifts the time of all packets so far.
+  void shift(std::int64_t by_ns) noexcept;
 
   /// Takes a packet. Returns false where it has no effect: there is no room for one more entity.
   bool take(const protocol::cigi::EntityControl& packet) noexcept;
@@ -51,7 +59,8 @@ class CigiEntities {
   /// and is seen once the second says so.
   bool take(const protocol::cigi::EntityPosition& packet) noexcept;
   bool take(const protocol::cigi::EntityControl40& packet) noexcept;
-  /// Returns false where it has no effect: no such entity, or rates of a part.
+  /// The entity moves by these rates until Entity Control says where it is. Returns false where it
+  /// has no effect: no such entity, rates of a part, or of an entity that is attached.
   bool take(const protocol::cigi::RateControl& packet) noexcept;
   /// Returns false where it has no effect: another view, or a group of views.
   bool take(const protocol::cigi::ViewControl& packet) noexcept;
@@ -83,6 +92,10 @@ class CigiEntities {
     std::uint16_t id = 0;
     protocol::cigi::EntityControl control;
     std::optional<protocol::cigi::RateControl> rates;
+    std::int64_t time_ns = 0;     ///< of its place and of the way below
+    glm::dvec3 way_world_m{0.0};  ///< by rates, since the host said where it is
+    glm::dquat turn_body{1.0, 0.0, 0.0, 0.0};
+    int repeats = 0;  ///< frames that say once more that it stands
     std::uint32_t scenario_id = 0;
     bool has_place = false;  ///< the host has said where it is
     bool known = false;      ///< the scenario has it
@@ -98,6 +111,13 @@ class CigiEntities {
   [[nodiscard]] std::optional<physics::Pose> pose_of(const Entity& entity,
                                                      int parents) const noexcept;
   [[nodiscard]] physics::Pose pose_on_earth(const Entity& entity) const noexcept;
+  /// Returns the pose that the host has said last.
+  [[nodiscard]] physics::Pose said_pose(const Entity& entity) const noexcept;
+  /// Adds the way by its rates up to now to the entity.
+  void move_on(Entity& entity) noexcept;
+  [[nodiscard]] bool is_moving(const Entity& entity) const noexcept {
+    return entity.rates && !entity.control.attached && entity.time_ns != time_ns_;
+  }
   [[nodiscard]] std::optional<protocol::PoseRates> rates_of(
       const Entity& entity, const physics::Pose& pose) const noexcept;
   [[nodiscard]] bool has_moved(const Entity& entity) const noexcept;
@@ -109,6 +129,7 @@ class CigiEntities {
   std::vector<Entity> entities_;  ///< reserved at the start
   static constexpr std::uint16_t kNone = 0xffff;
   std::unique_ptr<std::array<std::uint16_t, 65536>> places_;  ///< by id, in `entities_`
+  std::int64_t time_ns_ = 0;
   std::size_t next_ = 0;  ///< where the next frame goes on among those that are marked
   std::uint16_t carrier_ = 0;
   glm::dvec3 view_offset_body_m_{0.0};

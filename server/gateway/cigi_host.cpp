@@ -31,6 +31,7 @@ CigiEntities::Options entity_options(const CigiHost::Options& options) {
   CigiEntities::Options out;
   out.seeker = static_cast<std::uint16_t>(options.cigi.seeker);
   out.view = static_cast<std::uint16_t>(options.cigi.view);
+  out.predicted = !options.synchronous;
   for (const config::CigiEntityConfig& entity : options.cigi.entities) {
     out.entities.emplace_back(static_cast<std::uint16_t>(entity.id), entity.entity);
   }
@@ -128,6 +129,7 @@ bool CigiHost::take_control(const cigi::IgControl& control, std::int64_t receive
   mode_ = control.mode;
   if (!take_time(control, received_ns)) return false;
   host_frame_ = control.host_frame;
+  entities_.set_time(clock_.time_ns());
   take_database(control.database);
   return true;
 }
@@ -184,7 +186,8 @@ void CigiHost::forget() noexcept {
   entities_.clear();
   queries_.clear();
   weather_.clear();
-  told_.reset();
+  told_count_ = 0;
+  sky_.reset();
   told_no_seeker_ = told_timeless_ = false;
   frame_pending_ = false;
   awaits_ = false;
@@ -276,6 +279,12 @@ void CigiHost::take_sky(const cigi::CelestialSphereControl& packet) noexcept {
   // A host may set the minutes itself, so that a sun which stands still without it would be wrong.
   if (!packet.ephemeris_enabled) no_effect(packet, "time of day goes on by itself");
   if (!packet.date_valid || options_.scenario == nullptr) return;
+  // Hosts send the packet again and again. Only another time of day sets the clock.
+  const bool is_known =
+      sky_ && sky_->date_mmddyyyy == packet.date_mmddyyyy && sky_->hour_utc == packet.hour_utc &&
+      sky_->minute_utc == packet.minute_utc && sky_->second_utc == packet.second_utc;
+  sky_ = packet;
+  if (is_known) return;
   // Version 3.3 counts whole minutes, so that a clock within the minute is right.
   const std::int64_t width_ns = version_ == cigi::Version::v3_3 ? kMinuteNs : 0;
   // Whole nanoseconds end in the year 2262, and dates do not.
@@ -291,9 +300,10 @@ void CigiHost::take_sky(const cigi::CelestialSphereControl& packet) noexcept {
   const std::int64_t ahead_ns = clock_.time_ns() - wanted_ns;
   if (ahead_ns >= -kClockSlackNs && ahead_ns < width_ns + kClockSlackNs) return;
   clock_.shift(-ahead_ns);
+  entities_.shift(-ahead_ns);
   // Another time is another run, in which everything stands where it stood.
   ++run_id_;
-  entities_.mark_all();
+  entities_.mark_all(true);
   weather_.mark();
   events_.push(EventKind::gateway_time, static_cast<std::uint64_t>(clock_.time_ns()));
 }
@@ -313,8 +323,11 @@ void CigiHost::tell_unknown_entities() noexcept {
 
 void CigiHost::no_effect(std::uint16_t packet_id, std::string_view why) noexcept {
   counters_.add(Counter::gateway_packets_unused);
-  if (told_[packet_id]) return;
-  told_[packet_id] = true;
+  // Reasons are literals, so that their places tell them apart.
+  const std::pair<std::uint16_t, const char*> told(packet_id, why.data());
+  const auto end = told_.begin() + static_cast<std::ptrdiff_t>(told_count_);
+  if (told_count_ == kMaxTold || std::find(told_.begin(), end, told) != end) return;
+  told_[told_count_++] = told;
   std::array<char, 128> text{};
   const std::string_view name = cigi::packet_name(packet_id, version_);
   const int length =
@@ -349,7 +362,12 @@ bool CigiHost::next(protocol::HostFrameData& frame, std::int64_t /*now_ns*/) noe
   frame.received_ns = received_ns_;
   entities_.fill(frame);
   frame.environment = weather_.take_change(frame.sim_time_ns);
-  if (!check(frame)) return false;
+  if (!check(frame)) {
+    // The next frame tells all that this one would have told.
+    entities_.mark_all(false);
+    weather_.mark();
+    return false;
+  }
   if (options_.synchronous) {
     awaits_ = true;
     awaited_number_ = frame.frame_number;
@@ -359,25 +377,35 @@ bool CigiHost::next(protocol::HostFrameData& frame, std::int64_t /*now_ns*/) noe
 }
 
 bool CigiHost::check(protocol::HostFrameData& frame) noexcept {
-  protocol::DecodeFault fault;
+  const auto is_sound = [](const physics::Pose& pose, const auto& rates) {
+    return protocol::check_pose(pose, rates) == protocol::DecodeStatus::ok;
+  };
+  // Rates beyond the limits help no prediction, and the pose holds without them.
+  const auto drop_wild_rates = [&](const physics::Pose& pose, auto& rates) {
+    if (is_sound(pose, rates) || !is_sound(pose, std::optional<protocol::PoseRates>())) return;
+    rates.reset();
+    counters_.add(Counter::gateway_packets_refused);
+    no_effect(cigi::RateControl::kWire.of(version_).id, "the rates are too great");
+  };
   if (std::abs(frame.sim_time_ns) > protocol::kMaxSimTimeNs) {
     counters_.add(Counter::gateway_messages_refused);
-    no_effect(cigi::IgControl::kWire.v3_3.id, "its time is too far from that of the scenario");
+    no_effect(cigi::IgControl::kWire.of(version_).id,
+              "its time is too far from that of the scenario");
     return false;
   }
-  if (protocol::check_pose(frame.seeker, frame.seeker_rates, &fault) !=
-      protocol::DecodeStatus::ok) {
+  drop_wild_rates(frame.seeker, frame.seeker_rates);
+  if (!is_sound(frame.seeker, frame.seeker_rates)) {
     counters_.add(Counter::gateway_packets_refused);
-    no_effect(cigi::EntityControl::kWire.v3_3.id, "the sensor is too far away, or too fast");
+    no_effect(place_id(), "the sensor is too far away");
     return false;
   }
   std::uint32_t kept = 0;
   for (std::uint32_t i = 0; i < frame.entity_count; ++i) {
-    const protocol::EntityStateData& state = frame.entities[i];
-    if (state.has_pose &&
-        protocol::check_pose(state.pose, state.rates, &fault) != protocol::DecodeStatus::ok) {
+    protocol::EntityStateData& state = frame.entities[i];
+    if (state.has_pose) drop_wild_rates(state.pose, state.rates);
+    if (state.has_pose && !is_sound(state.pose, state.rates)) {
       counters_.add(Counter::gateway_packets_refused);
-      no_effect(cigi::EntityControl::kWire.v3_3.id, "an entity is too far away, or too fast");
+      no_effect(place_id(), "an entity is too far away");
       continue;
     }
     if (kept != i) frame.entities[kept] = state;
@@ -388,6 +416,13 @@ bool CigiHost::check(protocol::HostFrameData& frame) noexcept {
 }
 
 void CigiHost::report(const GatewayReport& report) noexcept {
+  if (report.kind == GatewayReport::Kind::reset) {
+    // The host does not send again what it has sent once.
+    entities_.mark_all(true);
+    weather_.mark();
+    awaits_ = false;
+    return;
+  }
   if (awaits_ && report.host_frame_number >= awaited_number_) awaits_ = false;
 }
 
@@ -417,7 +452,9 @@ std::span<const std::byte> CigiHost::message(std::int64_t now_ns) noexcept {
   static_cast<void>(writer.add(start));  // an empty message has room
   for (std::size_t i = 0; i < text_count_; ++i) static_cast<void>(writer.add(texts_[i]));
   text_count_ = 0;
-  counters_.add(Counter::gateway_answers, queries_.answer(writer));
+  const CigiQueries::Answered answered = queries_.answer(writer);
+  counters_.add(Counter::gateway_answers, answered.answers);
+  counters_.add(Counter::gateway_questions_dropped, answered.dropped);
   return writer.message();
 }
 

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <array>
-#include <bitset>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string_view>
+#include <utility>
 
 #include "emit/config/daemon_config.hpp"
 #include "emit/protocol/cigi/reader.hpp"
@@ -69,6 +70,12 @@ class CigiHost final : public HostGateway {
     no_effect(Packet::kWire.of(version_).id, why);
   }
   void no_effect(std::uint16_t packet_id, std::string_view why) noexcept;
+  /// Returns the id of the packet that says where an entity is.
+  [[nodiscard]] std::uint16_t place_id() const noexcept {
+    return version_ == protocol::cigi::Version::v3_3
+               ? protocol::cigi::EntityControl::kWire.v3_3.id
+               : protocol::cigi::EntityPosition::kWire.v4_0.id;
+  }
   void refuse(const protocol::cigi::Fault& fault) noexcept;
   /// Keeps a text for the host. The newest is left out when there are too many.
   void tell(std::string_view text) noexcept;
@@ -80,6 +87,7 @@ class CigiHost final : public HostGateway {
 
   static constexpr std::size_t kMessageBytes = 8192;  ///< of a message to the host
   static constexpr std::size_t kMaxTexts = 8;
+  static constexpr std::size_t kMaxTold = 64;
 
   Options options_;
   Counters& counters_;
@@ -110,7 +118,10 @@ class CigiHost final : public HostGateway {
   std::array<std::byte, kMessageBytes> memory_;
   std::array<protocol::cigi::ImageGeneratorMessage, kMaxTexts> texts_;
   std::size_t text_count_ = 0;
-  std::bitset<65536> told_;  ///< packet ids that no_effect() has spoken of in this run
+  /// Packet ids and reasons that no_effect() has spoken of in this run.
+  std::array<std::pair<std::uint16_t, const char*>, kMaxTold> told_{};
+  std::size_t told_count_ = 0;
+  std::optional<protocol::cigi::CelestialSphereControl> sky_;  ///< the latest of this run
   bool told_no_seeker_ = false;
   bool told_timeless_ = false;
 };

@@ -67,21 +67,27 @@ bool CigiQueries::add(const Question& question) noexcept {
   return true;
 }
 
-std::size_t CigiQueries::answer(cigi::Writer& writer) noexcept {
-  std::size_t answers = 0;
+CigiQueries::Answered CigiQueries::answer(cigi::Writer& writer) noexcept {
+  Answered out;
   std::size_t kept = 0;
   bool has_room = true;
+  const auto add = [&](const Question& question, bool blind) {
+    return writer.add(
+        std::visit([&](const auto& request) { return answer_to(request, question.lsn, blind); },
+                   question.request));
+  };
   for (std::size_t i = 0; i < count_; ++i) {
     Question question = questions_[i];
     bool stays = true;
     if (question.wait_frames > 0) {
       --question.wait_frames;
     } else if (has_room) {
-      const cigi::Packet packet = std::visit(
-          [&](const auto& request) { return answer_to(request, question.lsn); }, question.request);
-      has_room = !writer.add(packet);
+      cigi::Fault fault = add(question, false);
+      // Numbers that no packet can hold are no answer.
+      if (fault && fault.kind != cigi::Fault::Kind::no_space) fault = add(question, true);
+      has_room = fault.kind != cigi::Fault::Kind::no_space;
       if (has_room) {
-        ++answers;
+        ++(fault ? out.dropped : out.answers);
         const std::uint8_t period =
             std::visit([](const auto& request) { return period_of(request); }, question.request);
         stays = period != 0;
@@ -91,7 +97,7 @@ std::size_t CigiQueries::answer(cigi::Writer& writer) noexcept {
     if (stays) questions_[kept++] = question;
   }
   count_ = kept;
-  return answers;
+  return out;
 }
 
 std::optional<glm::dvec3> CigiQueries::point_of(const cigi::Place& place, bool relative,
@@ -116,13 +122,13 @@ void CigiQueries::write_normal(const SceneQuery::Hit& hit, float& azimuth_deg,
   elevation_deg = static_cast<float>(std::asin(std::clamp(enu.z, -1.0, 1.0)) / kDegree);
 }
 
-cigi::Packet CigiQueries::answer_to(const cigi::HatHotRequest& request,
-                                    std::uint8_t lsn) const noexcept {
+cigi::Packet CigiQueries::answer_to(const cigi::HatHotRequest& request, std::uint8_t lsn,
+                                    bool blind) const noexcept {
   std::optional<SceneQuery::Hit> hit;
   double of_m = 0.0;
   double above_m = 0.0;
   if (const auto point = point_of(request.place, request.relative_to_entity, request.entity_id);
-      point && scene_ != nullptr) {
+      point && scene_ != nullptr && !blind) {
     const physics::GeoPlace place = earth_.place_of(*point);
     hit = scene_->ground(*point, earth_.world_from_enu(place)[2]);
     if (hit) {
@@ -153,14 +159,14 @@ cigi::Packet CigiQueries::answer_to(const cigi::HatHotRequest& request,
   return out;
 }
 
-cigi::Packet CigiQueries::answer_to(const cigi::LosSegmentRequest& request,
-                                    std::uint8_t lsn) const noexcept {
+cigi::Packet CigiQueries::answer_to(const cigi::LosSegmentRequest& request, std::uint8_t lsn,
+                                    bool blind) const noexcept {
   Sight sight{request.request_id, request.extended, request.response_relative, false, {}};
   const auto source = point_of(request.source, request.source_relative, request.entity_id);
   const auto destination = point_of(
       request.destination, request.destination_relative,
       request.destination_entity_valid ? request.destination_entity_id : request.entity_id);
-  if (!source || !destination || scene_ == nullptr) return packet_of(sight, lsn);
+  if (!source || !destination || scene_ == nullptr || blind) return packet_of(sight, lsn);
   const double length_m = glm::distance(*source, *destination);
   sight.visible = true;
   if (length_m > 0.0) {
@@ -178,11 +184,11 @@ cigi::Packet CigiQueries::answer_to(const cigi::LosSegmentRequest& request,
   return packet_of(sight, lsn);
 }
 
-cigi::Packet CigiQueries::answer_to(const cigi::LosVectorRequest& request,
-                                    std::uint8_t lsn) const noexcept {
+cigi::Packet CigiQueries::answer_to(const cigi::LosVectorRequest& request, std::uint8_t lsn,
+                                    bool blind) const noexcept {
   Sight sight{request.request_id, request.extended, request.response_relative, false, {}};
   const auto source = point_of(request.source, request.source_relative, request.entity_id);
-  if (!source || scene_ == nullptr) return packet_of(sight, lsn);
+  if (!source || scene_ == nullptr || blind) return packet_of(sight, lsn);
   const double azimuth_rad = request.azimuth_deg * kDegree;
   const double elevation_rad = request.elevation_deg * kDegree;
   const double level = std::cos(elevation_rad);
@@ -246,8 +252,8 @@ cigi::Packet CigiQueries::packet_of(const Sight& sight, std::uint8_t lsn) const 
   return out;
 }
 
-cigi::Packet CigiQueries::answer_to(const cigi::PositionRequest& request,
-                                    std::uint8_t /*lsn*/) const noexcept {
+cigi::Packet CigiQueries::answer_to(const cigi::PositionRequest& request, std::uint8_t /*lsn*/,
+                                    bool blind) const noexcept {
   cigi::PositionResponse out;
   out.object_id = request.object_id;
   out.part_id = request.part_id;
@@ -261,7 +267,7 @@ cigi::Packet CigiQueries::answer_to(const cigi::PositionRequest& request,
     pose = entities_.seeker_pose();
   }
   // The packet cannot say that there is no answer: an object without a pose is at zero.
-  if (!pose) return out;
+  if (!pose || blind) return out;
   if (request.frame == cigi::PositionFrame::parent && parent) {
     out.frame = cigi::PositionFrame::parent;
     const glm::dquat body_from_world = glm::conjugate(parent->world_from_body);

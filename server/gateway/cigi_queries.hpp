@@ -40,8 +40,12 @@ class CigiQueries {
   }
   /// Appends the answers that are due now. Those without room in the message come with the next
   /// one.
-  /// @return the number of answers
-  std::size_t answer(protocol::cigi::Writer& writer) noexcept;
+  /// @return the number of answers, and of those that no packet can hold
+  struct Answered {
+    std::size_t answers = 0;
+    std::size_t dropped = 0;
+  };
+  Answered answer(protocol::cigi::Writer& writer) noexcept;
 
  private:
   using Request = std::variant<protocol::cigi::HatHotRequest, protocol::cigi::LosSegmentRequest,
@@ -61,14 +65,15 @@ class CigiQueries {
   };
 
   bool add(const Question& question) noexcept;
+  /// @param blind  gives the answer that there is none
   [[nodiscard]] protocol::cigi::Packet answer_to(const protocol::cigi::HatHotRequest& request,
-                                                 std::uint8_t lsn) const noexcept;
+                                                 std::uint8_t lsn, bool blind) const noexcept;
   [[nodiscard]] protocol::cigi::Packet answer_to(const protocol::cigi::LosSegmentRequest& request,
-                                                 std::uint8_t lsn) const noexcept;
+                                                 std::uint8_t lsn, bool blind) const noexcept;
   [[nodiscard]] protocol::cigi::Packet answer_to(const protocol::cigi::LosVectorRequest& request,
-                                                 std::uint8_t lsn) const noexcept;
+                                                 std::uint8_t lsn, bool blind) const noexcept;
   [[nodiscard]] protocol::cigi::Packet answer_to(const protocol::cigi::PositionRequest& request,
-                                                 std::uint8_t lsn) const noexcept;
+                                                 std::uint8_t lsn, bool blind) const noexcept;
   [[nodiscard]] protocol::cigi::Packet packet_of(const Sight& sight,
                                                  std::uint8_t lsn) const noexcept;
   /// Returns a point of a request in the world; none: its entity has no pose.

@@ -21,6 +21,12 @@ namespace {
 constexpr std::uint32_t kFrozen = 1U << 21U;
 constexpr std::uint32_t kDeactivated = 1U << 23U;
 
+/// Returns true for models whose attitude turns by the angular velocity.
+bool turns(dis::DeadReckoningModel model) noexcept {
+  using enum dis::DeadReckoningModel;
+  return model == rpw || model == rvw || model == rpb || model == rvb;
+}
+
 dis::EntityId id_of(const std::string& text) {
   const auto numbers = config::parse_dis_id(text);
   EMIT_CHECK(numbers.has_value());
@@ -177,8 +183,9 @@ bool DisExercise::place(const Entity& entity, std::int64_t now_ns, physics::Pose
       glm::normalize(glm::quat_cast(world_from_ecef * glm::transpose(at.body_from_ecef)));
   rates.reset();
   if (!entity.frozen) {
-    rates = protocol::PoseRates{world_from_ecef * at.velocity_ecef_m_s,
-                                entity.motion.angular_velocity_rad_s};
+    rates = protocol::PoseRates{
+        world_from_ecef * at.velocity_ecef_m_s,
+        turns(entity.motion.model) ? entity.motion.angular_velocity_rad_s : glm::dvec3(0.0)};
   }
   if (protocol::check_pose(pose, rates) == protocol::DecodeStatus::ok) return true;
   counters_.add(Counter::gateway_packets_refused);
@@ -189,8 +196,12 @@ bool DisExercise::place(const Entity& entity, std::int64_t now_ns, physics::Pose
 
 bool DisExercise::next(protocol::HostFrameData& frame, std::int64_t now_ns) noexcept {
   Entity& seeker = entities_.front();
-  if (!seeker.came || is_silent(seeker, now_ns) || now_ns < due_ns_) return false;
+  if (!seeker.came) return false;
+  // Somebody has set the clock back: the next frame is not due in hours.
+  if (due_ns_ - now_ns > 2 * period_ns_) due_ns_ = now_ns;
+  if (now_ns < due_ns_) return false;
   due_ns_ = now_ns - due_ns_ > period_ns_ ? now_ns + period_ns_ : due_ns_ + period_ns_;
+  if (is_silent(seeker, now_ns)) return false;
   if (!place(seeker, now_ns, frame.seeker, frame.seeker_rates)) return false;
   const std::int64_t sender_ns = sender_time_ns(seeker, now_ns);
   if (run_id_ == 0) {
@@ -208,20 +219,25 @@ bool DisExercise::next(protocol::HostFrameData& frame, std::int64_t now_ns) noex
   frame.entity_count = 0;
   for (std::size_t i = 1; i < entities_.size(); ++i) {
     Entity& entity = entities_[i];
-    if (!entity.came) continue;
-    const bool on = entity.on && !is_silent(entity, now_ns);
-    if (!on && !entity.shown_on) continue;
+    // The exercise alone says what is there: an entity that it does not have is hidden too.
+    const bool on = entity.came && entity.on && !is_silent(entity, now_ns);
+    if (!on && entity.shown == false) continue;
     protocol::EntityStateData& out = frame.entities[frame.entity_count];
     out = {};
     out.entity_id = entity.scenario_id;
     out.on = on;
     out.has_pose = on;
     if (on && !place(entity, now_ns, out.pose, out.rates)) continue;
-    out.teleport = on && !entity.shown_on;
-    entity.shown_on = on;
+    out.teleport = on && entity.shown != true;
+    entity.shown = on;
     ++frame.entity_count;
   }
   return true;
+}
+
+void DisExercise::report(const GatewayReport& report) noexcept {
+  if (report.kind != GatewayReport::Kind::reset) return;
+  for (Entity& entity : entities_) entity.shown.reset();
 }
 
 std::int64_t DisExercise::wake_at_ns() const noexcept {

@@ -2,6 +2,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -38,7 +39,7 @@ class DisExercise final : public HostGateway {
 
   void take(std::span<const std::byte> datagram, std::int64_t received_ns) noexcept override;
   [[nodiscard]] bool next(protocol::HostFrameData& frame, std::int64_t now_ns) noexcept override;
-  void report(const GatewayReport& /*report*/) noexcept override {}
+  void report(const GatewayReport& report) noexcept override;
   [[nodiscard]] std::span<const std::byte> message(std::int64_t /*now_ns*/) noexcept override {
     return {};
   }
@@ -55,11 +56,12 @@ class DisExercise final : public HostGateway {
     protocol::dis::EntityId id;
     std::uint32_t scenario_id = 0;  ///< 0: the seeker
     protocol::dis::Motion motion;
-    bool came = false;          ///< it has had a PDU
-    bool on = false;            ///< it is part of the exercise now
-    bool frozen = false;        ///< it does not move
-    bool shown_on = false;      ///< as the latest host frame had it
-    std::size_t sender = 0;     ///< index into `senders_`
+    bool came = false;    ///< it has had a PDU
+    bool on = false;      ///< it is part of the exercise now
+    bool frozen = false;  ///< it does not move
+    std::optional<bool>
+        shown;               ///< on or off in the latest host frame; none: it has not been in one
+    std::size_t sender = 0;  ///< index into `senders_`
     std::int64_t stamp_ns = 0;  ///< instant of its motion, by the sender
     std::int64_t heard_ns = 0;  ///< arrival of its latest PDU, wall
   };

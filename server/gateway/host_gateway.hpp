@@ -11,8 +11,9 @@ namespace emit::server {
 /// Report of the conductor on a host frame.
 struct GatewayReport {
   /// refused: no image comes of it. unused: the run is stopped, so that none comes. published: its
-  /// image was handed on.
-  enum class Kind : std::uint8_t { refused, unused, published };
+  /// image was handed on. reset: a command has forgotten all that hosts have sent, and the number
+  /// means nothing.
+  enum class Kind : std::uint8_t { refused, unused, published, reset };
   Kind kind = Kind::published;
   std::uint64_t host_frame_number = 0;
 };

@@ -27,9 +27,14 @@ void NetFdmModel::take(std::span<const std::byte> datagram, std::int64_t receive
                  net_fdm::fault_text(fault, buffer));
     return;
   }
-  // The kernel's stamps may go back where somebody sets the clock.
-  received_ns_ = number_ == 0 ? received_ns : std::max(received_ns, received_ns_);
-  if (number_ == 0) begin_ns_ = received_ns_;
+  if (number_ == 0) {
+    begin_ns_ = received_ns;
+    run_id_ = static_cast<std::uint64_t>(received_ns);
+  } else if (received_ns < received_ns_) {
+    // Somebody has set the clock back. Simulation time stands for this datagram and goes on.
+    begin_ns_ += received_ns - received_ns_;
+  }
+  received_ns_ = received_ns;
   ++number_;
   pending_ = true;
 }
@@ -38,7 +43,7 @@ bool NetFdmModel::next(protocol::HostFrameData& frame, std::int64_t /*now_ns*/) 
   if (!std::exchange(pending_, false)) return false;
   frame.frame_number = number_;
   frame.sim_time_ns = first_time_ns_ + (received_ns_ - begin_ns_);
-  frame.run_id = static_cast<std::uint64_t>(begin_ns_);
+  frame.run_id = run_id_;
   frame.received_ns = received_ns_;
   frame.entity_count = 0;
   frame.environment.reset();

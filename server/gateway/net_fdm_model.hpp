@@ -39,7 +39,8 @@ class NetFdmModel final : public HostGateway {
   protocol::net_fdm::State state_;
   bool pending_ = false;
   std::uint64_t number_ = 0;
-  std::int64_t begin_ns_ = 0;     ///< arrival of the first datagram, wall
+  std::uint64_t run_id_ = 0;
+  std::int64_t begin_ns_ = 0;     ///< wall instant of `first_time_ns_`
   std::int64_t received_ns_ = 0;  ///< arrival of the latest one, wall
 };
 

@@ -190,6 +190,9 @@ bool Conductor::take_command(const HostInput& input, std::int64_t now_ns) noexce
     if (motion_) {
       motion_->reset();
     }
+    if (options_.gateway) {
+      report({GatewayReport::Kind::reset, 0});
+    }
   } else if (immediate_step) {
     // The pose may be old; the frame was asked for now.
     issue_pose(true, now_ns);

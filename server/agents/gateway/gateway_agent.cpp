@@ -10,6 +10,7 @@ constexpr int kMostPerTurn = 16;
 }  // namespace
 
 int GatewayAgent::do_work(std::int64_t now_ns) noexcept {
+  turned_ns_ = now_ns;
   int work = take_reports() + take_inputs(now_ns);
   if (const auto message = gateway_->message(now_ns); !message.empty()) {
     port_.send(message);

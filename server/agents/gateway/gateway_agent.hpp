@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -28,7 +29,12 @@ class GatewayAgent final : public Agent {
 
   [[nodiscard]] std::string_view name() const noexcept override { return "gateway"; }
   int do_work(std::int64_t now_ns) noexcept override;
-  [[nodiscard]] std::int64_t wake_at_ns() const noexcept override { return gateway_->wake_at_ns(); }
+  [[nodiscard]] std::int64_t wake_at_ns() const noexcept override {
+    // A due frame without room waits for the conductor, and the agent looks now and then.
+    constexpr std::int64_t kLookNs = 1'000'000;
+    const std::int64_t due_ns = gateway_->wake_at_ns();
+    return waits_for_room_ ? std::max(due_ns, turned_ns_ + kLookNs) : due_ns;
+  }
   [[nodiscard]] int wait_fd() const noexcept override { return waits_for_room_ ? -1 : port_.fd(); }
   [[nodiscard]] SocketAddress address() const noexcept { return port_.address(); }
   [[nodiscard]] const std::string& notes() const noexcept { return notes_; }
@@ -41,6 +47,7 @@ class GatewayAgent final : public Agent {
   GatewayPort port_;
   std::unique_ptr<HostGateway> gateway_;
   std::string notes_;
+  std::int64_t turned_ns_ = 0;   ///< instant of the latest turn, wall
   bool waits_for_room_ = false;  ///< on the ring to the conductor
 };
 

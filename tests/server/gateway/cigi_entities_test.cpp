@@ -43,8 +43,9 @@ cigi::EntityControl child_of(std::uint16_t parent, std::uint16_t id, const glm::
 
 class CigiEntitiesTest : public testing::Test {
  protected:
-  CigiEntities make(std::set<std::uint32_t> known) {
+  CigiEntities make(std::set<std::uint32_t> known, bool predicted = false) {
     CigiEntities::Options options;
+    options.predicted = predicted;
     options.known = [known = std::move(known)](std::uint32_t id) { return known.contains(id); };
     return {earth_, nullptr, std::move(options)};
   }
@@ -167,6 +168,73 @@ TEST_F(CigiEntitiesTest, RatesAreThoseOfTheirFrame) {
   const auto local = fill(entities).seeker_rates;
   EXPECT_LT(glm::distance(local->velocity_world_m_s, glm::dvec3(100.0, 0.0, -5.0)), 1e-6)
       << "forward is east, the z axis is down";
+}
+
+TEST_F(CigiEntitiesTest, RatesMoveAnEntityUntilTheHostSaysWhereItIs) {
+  CigiEntities entities = make({5});
+  ASSERT_TRUE(entities.take(entity_at(0, kOrigin)));
+  ASSERT_TRUE(entities.take(entity_at(5, kOrigin)));
+  cigi::RateControl rates;
+  rates.entity_id = 5;
+  rates.local = true;
+  rates.x_m_s = 10.0F;
+  rates.yaw_deg_s = 90.0F;
+  ASSERT_TRUE(entities.take(rates));
+  entities.set_time(500'000'000);
+  const auto& frame = fill(entities);
+  ASSERT_EQ(frame.entity_count, 1U) << "nobody has sent it again";
+  EXPECT_LT(glm::distance(frame.entities[0].pose.position_world_m, glm::dvec3(0.0, 5.0, 0.0)),
+            1e-6);
+  const glm::dvec3 nose = frame.entities[0].pose.world_from_body * glm::dvec3(1.0, 0.0, 0.0);
+  EXPECT_NEAR(nose.x, std::sqrt(0.5), 1e-9) << "half of a right turn";
+  // Other rates go on from there.
+  rates.x_m_s = 0.0F;
+  rates.yaw_deg_s = -90.0F;
+  ASSERT_TRUE(entities.take(rates));
+  entities.set_time(1'000'000'000);
+  const auto& later = fill(entities);
+  EXPECT_LT(glm::distance(later.entities[0].pose.position_world_m, glm::dvec3(0.0, 5.0, 0.0)),
+            1e-6);
+  EXPECT_NEAR((later.entities[0].pose.world_from_body * glm::dvec3(1.0, 0.0, 0.0)).y, 1.0, 1e-9);
+  // A place ends the way, and destruction ends the rates.
+  auto gone = entity_at(5, kOrigin);
+  ASSERT_TRUE(entities.take(gone));
+  gone.state = cigi::EntityState::destroyed;
+  ASSERT_TRUE(entities.take(gone));
+  ASSERT_TRUE(entities.take(entity_at(5, kOrigin)));
+  entities.set_time(9'000'000'000);
+  EXPECT_LT(glm::length(entities.pose_of(std::uint16_t{5})->position_world_m), 1e-6);
+}
+
+TEST_F(CigiEntitiesTest, RatesOfAnAttachedEntityHaveNoEffect) {
+  CigiEntities entities = make({});
+  ASSERT_TRUE(entities.take(entity_at(0, kOrigin)));
+  ASSERT_TRUE(entities.take(child_of(0, 3, {1.0, 0.0, 0.0})));
+  cigi::RateControl rates;
+  rates.entity_id = 3;
+  EXPECT_FALSE(entities.take(rates));
+}
+
+TEST_F(CigiEntitiesTest, WhereFramesArePredictedAnEntityThatIsNotSentAgainIsSaidToStand) {
+  CigiEntities entities = make({5}, true);
+  ASSERT_TRUE(entities.take(entity_at(0, kOrigin)));
+  ASSERT_TRUE(entities.take(entity_at(5, kOrigin)));
+  std::vector<std::uint32_t> counts;
+  for (int frame = 0; frame < 6; ++frame) counts.push_back(fill(entities).entity_count);
+  EXPECT_THAT(counts, testing::ElementsAre(1, 1, 1, 1, 0, 0));
+  EXPECT_FALSE(frame_->entities[0].teleport);
+}
+
+TEST_F(CigiEntitiesTest, ANumberThatStandsForAnotherEntityIsUnknown) {
+  CigiEntities::Options options;
+  options.known = [](std::uint32_t id) { return id == 1; };
+  options.entities = {{std::uint16_t{12}, 1U}};
+  CigiEntities entities(earth_, nullptr, std::move(options));
+  ASSERT_TRUE(entities.take(entity_at(0, kOrigin)));
+  ASSERT_TRUE(entities.take(entity_at(12, kOrigin)));
+  ASSERT_TRUE(entities.take(entity_at(1, kOrigin)));
+  EXPECT_EQ(fill(entities).entity_count, 1U);
+  EXPECT_EQ(entities.take_unknown(), std::uint16_t{1});
 }
 
 TEST_F(CigiEntitiesTest, AViewIsMountedOnItsEntity) {

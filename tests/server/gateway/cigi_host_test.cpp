@@ -120,6 +120,58 @@ TEST_F(CigiHostTest, WhatWaitsForNothingNeedsNoReport) {
   EXPECT_TRUE(receive());
 }
 
+TEST_F(CigiHostTest, ATimeOfDayThatIsSentAgainAndAgainSetsTheClockOnce) {
+  const scene::ScenarioDesc scenario;  // its epoch is 1970
+  CigiHost::Options options;
+  options.scenario = &scenario;
+  options.rate_hz = 1.0;
+  gateway_ = std::make_unique<CigiHost>(options, nullptr, counters_, events_);
+  cigi::CelestialSphereControl noon;
+  noon.date_valid = noon.sun_enabled = true;
+  noon.hour_utc = 12;
+  noon.date_mmddyyyy = 1'01'1970;
+  std::uint64_t run_id = 0;
+  for (int second = 0; second < 300; ++second) {
+    now_ns_ += 1'000'000'000;
+    send(cigi::IgMode::operate, {seeker(), noon});
+    ASSERT_TRUE(next());
+    if (second == 0) run_id = frame_->run_id;
+    ASSERT_EQ(frame_->run_id, run_id) << "second " << second;
+    ASSERT_EQ(frame_->sim_time_ns, (12 * 3600 + second) * std::int64_t{1'000'000'000});
+  }
+}
+
+TEST_F(CigiHostTest, AResetBringsBackWhatTheHostHasSentOnce) {
+  make();
+  cigi::EntityControl truck = seeker();
+  truck.entity_id = 7;
+  cigi::AtmosphereControl air;
+  air.air_temperature_c = 20.0F;
+  send(cigi::IgMode::operate, {seeker(), truck, air});
+  ASSERT_TRUE(next());
+  EXPECT_EQ(frame_->entity_count, 1U);
+  EXPECT_TRUE(frame_->environment);
+  send(cigi::IgMode::operate, {seeker()});
+  ASSERT_TRUE(next());
+  EXPECT_EQ(frame_->entity_count, 0U);
+  EXPECT_FALSE(frame_->environment);
+  gateway_->report({GatewayReport::Kind::reset, 0});
+  send(cigi::IgMode::operate, {seeker()});
+  ASSERT_TRUE(next());
+  EXPECT_EQ(frame_->entity_count, 1U);
+  EXPECT_TRUE(frame_->environment);
+}
+
+TEST_F(CigiHostTest, WildRatesOfTheSensorEndNoImage) {
+  make();
+  cigi::RateControl wild;
+  wild.yaw_deg_s = 1e30F;
+  send(cigi::IgMode::operate, {seeker(), wild});
+  ASSERT_TRUE(next());
+  EXPECT_FALSE(frame_->seeker_rates);
+  EXPECT_EQ(counters_.get(Counter::gateway_packets_refused), 1U);
+}
+
 TEST_F(CigiHostTest, TheClockOfTheMachineMaySetBack) {
   make();
   ASSERT_TRUE(receive());

@@ -199,13 +199,47 @@ TEST_F(DisExerciseTest, SilenceHidesAnEntityAndASilentSeekerEndsThePoses) {
   const std::int64_t later_ns = kWallNs + 13 * kOneSecondNs;
   EXPECT_FALSE(exercise_->next(*frame_, later_ns));
   send(state(3, 13.0), later_ns, later_ns);
-  ASSERT_TRUE(exercise_->next(*frame_, later_ns));
+  ASSERT_TRUE(exercise_->next(*frame_, later_ns + 10 * kOneMsNs));
   ASSERT_EQ(frame_->entity_count, 1U);
   EXPECT_FALSE(frame_->entities[0].on);
   send(state(4, 13.0), later_ns + kOneMsNs, later_ns + kOneMsNs);
-  ASSERT_TRUE(exercise_->next(*frame_, later_ns + 10 * kOneMsNs));
+  ASSERT_TRUE(exercise_->next(*frame_, later_ns + 20 * kOneMsNs));
   EXPECT_TRUE(frame_->entities[0].on);
   EXPECT_TRUE(frame_->entities[0].teleport);
+}
+
+TEST_F(DisExerciseTest, WhatTheExerciseDoesNotHaveIsHidden) {
+  send(state(3, 0.0), kWallNs, kWallNs);
+  ASSERT_TRUE(exercise_->next(*frame_, kWallNs));
+  ASSERT_EQ(frame_->entity_count, 1U) << "the scenario may show it";
+  EXPECT_FALSE(frame_->entities[0].on);
+  ASSERT_TRUE(exercise_->next(*frame_, kWallNs + 10 * kOneMsNs));
+  EXPECT_EQ(frame_->entity_count, 0U);
+  // After a command that resets the run it has to be said once more.
+  exercise_->report({GatewayReport::Kind::reset, 0});
+  ASSERT_TRUE(exercise_->next(*frame_, kWallNs + 20 * kOneMsNs));
+  EXPECT_EQ(frame_->entity_count, 1U);
+}
+
+TEST_F(DisExerciseTest, ASilentSeekerAndAClockThatIsSetBackKeepNobodyAwake) {
+  send(state(3, 0.0), kWallNs, kWallNs);
+  ASSERT_TRUE(exercise_->next(*frame_, kWallNs));
+  const std::int64_t later_ns = kWallNs + 20 * kOneSecondNs;
+  EXPECT_FALSE(exercise_->next(*frame_, later_ns));
+  EXPECT_GT(exercise_->wake_at_ns(), later_ns);
+  // An hour back: the next host frame does not wait for an hour.
+  const std::int64_t back_ns = later_ns - 3600 * kOneSecondNs;
+  send(state(3, 1.0), kWallNs + kOneSecondNs, back_ns);
+  static_cast<void>(exercise_->next(*frame_, back_ns));
+  EXPECT_LT(exercise_->wake_at_ns(), back_ns + kOneSecondNs);
+}
+
+TEST_F(DisExerciseTest, ModelsThatDoNotTurnHaveNoRateOfTurn) {
+  send(state(3, 0.0, dis::DeadReckoningModel::fpw), kWallNs, kWallNs);
+  ASSERT_TRUE(exercise_->next(*frame_, kWallNs));
+  ASSERT_TRUE(frame_->seeker_rates);
+  EXPECT_EQ(frame_->seeker_rates->angular_rate_body_rad_s, glm::dvec3(0.0));
+  EXPECT_GT(glm::length(frame_->seeker_rates->velocity_world_m_s), 100.0);
 }
 
 TEST_F(DisExerciseTest, AnUpdateKeepsTheModel) {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <random>
 
+#include "emit/config/load.hpp"
 #include "emit/protocol/convert.hpp"
 #include "gateway/cigi_host.hpp"
 
@@ -51,6 +52,8 @@ class HostileHost {
   float wild() { return std::ldexp(angle(1.0F), static_cast<int>(pick(254)) - 126); }
   cigi::Place place(bool offset) {
     if (offset) return {wild(), wild(), wild()};
+    // Many places are above the scene, so that rays meet something.
+    if (pick(2) == 0) return {48.56 + 1e-4 * angle(1.0F), 11.26 + 1e-4 * angle(1.0F), angle(1e3F)};
     return {angle(90.0F), angle(180.0F), pick(2) == 0 ? wild() : angle(1e5F)};
   }
   cigi::Packet packet() {
@@ -168,14 +171,19 @@ class HostileHost {
 TEST(HostileCigi, WhateverComesFramesAreSoundAndAnswersWellFormed) {
   Counters counters;
   EventLog events(64, counters);
-  scene::ScenarioDesc scenario;
+  // A ground and a box, of which the hostile host may ask anything.
+  auto loaded = config::load_scenario(EMIT_TEST_SHARE_DIR "/scenarios/box.toml");
+  ASSERT_TRUE(loaded) << loaded.error().text;
+  scene::ScenarioDesc scenario = *loaded;
+  auto scene = SceneQuery::create(scenario);
+  ASSERT_TRUE(scene) << scene.error().text;
   for (std::uint32_t id = 1; id < 4; ++id) {
     scenario.objects.emplace_back().entity_id = id;
   }
   CigiHost::Options options;
   options.scenario = &scenario;
   options.rate_hz = 100.0;
-  CigiHost gateway(options, nullptr, counters, events);
+  CigiHost gateway(options, std::make_unique<SceneQuery>(std::move(*scene)), counters, events);
   HostileHost host(3);
   auto frame = std::make_unique<protocol::HostFrameData>();
   std::int64_t now_ns = 1'800'000'000'000'000'000;

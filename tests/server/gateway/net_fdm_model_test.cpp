@@ -56,6 +56,12 @@ TEST(NetFdmModel, ADatagramIsAPoseAtItsArrival) {
   model.take(bytes, kArrivalNs);
   ASSERT_TRUE(model.next(*frame, kArrivalNs));
   EXPECT_EQ(frame->sim_time_ns, 5'000 + 40'000'000);
+  EXPECT_EQ(frame->received_ns, kArrivalNs);
+  const std::uint64_t run_id = frame->run_id;
+  model.take(bytes, kArrivalNs + 10'000'000);
+  ASSERT_TRUE(model.next(*frame, kArrivalNs + 10'000'000));
+  EXPECT_EQ(frame->sim_time_ns, 5'000 + 50'000'000) << "it goes on";
+  EXPECT_EQ(frame->run_id, run_id);
 }
 
 TEST(NetFdmModel, WhatIsNoDatagramIsRefused) {
