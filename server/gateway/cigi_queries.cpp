@@ -171,15 +171,11 @@ cigi::Packet CigiQueries::answer_to(const cigi::LosSegmentRequest& request, std:
   sight.visible = true;
   if (length_m > 0.0) {
     sight.hit = scene_->first_hit(*source, (*destination - *source) / length_m);
-    // The destination does not hide itself.
+    // The surface on which the destination lies does not hide it.
     constexpr double kAtDestinationM = 1e-6;
     if (sight.hit && sight.hit->range_m > length_m + kAtDestinationM) sight.hit.reset();
-    if (sight.hit) {
-      const bool is_destination =
-          request.destination_entity_valid && sight.hit->entity_id != 0 &&
-          entities_.host_id_of(sight.hit->entity_id) == request.destination_entity_id;
-      sight.visible = is_destination || sight.hit->range_m > length_m - kAtDestinationM;
-    }
+    // A destination inside of an entity counts as hidden, and the answer names the entity.
+    if (sight.hit) sight.visible = sight.hit->range_m > length_m - kAtDestinationM;
   }
   return packet_of(sight, lsn);
 }

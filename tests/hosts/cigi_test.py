@@ -340,7 +340,10 @@ class Questions(unittest.TestCase):
         offset = answers[1]["place"]
         self.assertAlmostEqual(max(abs(offset[0]), abs(offset[1])), 1.0, delta=1e-3)
         self.assertAlmostEqual(offset[2], -1.0, delta=1e-3)
-        self.assertTrue(answers[2]["visible"] and answers[3]["visible"])
+        # The destination is inside of the target: hidden, by the target itself.
+        for request in (2, 3):
+            self.assertFalse(answers[request]["visible"])
+            self.assertEqual(answers[request]["entity"], 7)
         point = (cube[0], cube[1], cube[2] + 10.0)
         self.assertAlmostEqual(answers[4]["height_m"], point[2] - self.drop(point), delta=1e-3)
         position = [answer for answer in self.host.answers if answer["id"] == 108][0]
