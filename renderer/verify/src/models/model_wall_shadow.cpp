@@ -14,8 +14,8 @@ physics::Result<std::string> run_wall_shadow(const EvaluateRequest& request,
   if (auto ok = check_visibility_options(request); !ok) return tl::unexpected(ok.error());
   auto columns = read_columns<3>(table, {"H", "e_deg", "x"});
   if (!columns) return tl::unexpected(std::move(columns.error()));
-  const auto& [height_m, elevation_deg, distance_m] = *columns;
-  const MakeRow make = [&](std::size_t i) {
+  const MakeRow make = [&columns](std::size_t i) {
+    const auto& [height_m, elevation_deg, distance_m] = *columns;
     return wall_shadow_row(height_m[i], elevation_deg[i] * physics::kDegree, distance_m[i]);
   };
   if (request.device == Device::gpu) {
