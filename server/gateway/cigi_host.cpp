@@ -106,7 +106,9 @@ void CigiHost::take(std::span<const std::byte> datagram, std::int64_t received_n
   entities_.place_in_scene();
   frame_pending_ = entities_.has_seeker();
   if (!frame_pending_ && !std::exchange(told_no_seeker_, true)) {
-    tell("no image: the entity that carries the sensor has no pose");
+    constexpr std::string_view kWhy = "no image: the entity that carries the sensor has no pose";
+    tell(kWhy);
+    events_.push(EventKind::gateway_refused, 0, 0, kWhy);
   }
 }
 
@@ -208,7 +210,8 @@ void CigiHost::take_packet(const cigi::Packet& packet) noexcept {
                       std::is_same_v<T, cigi::EntityControl40>) {
           if (!entities_.take(in)) no_effect(in, "too many entities");
         } else if constexpr (std::is_same_v<T, cigi::RateControl>) {
-          if (!entities_.take(in)) no_effect(in, "no such entity, or rates of a part");
+          if (!entities_.take(in))
+            no_effect(in, "no such entity, or rates of a part or of an attached entity");
         } else if constexpr (std::is_same_v<T, cigi::ViewControl>) {
           if (!entities_.take(in)) no_effect(in, "another view than the sensor's");
         } else if constexpr (std::is_same_v<T, cigi::AtmosphereControl>) {

@@ -9,6 +9,7 @@
 #include "emit/config/load.hpp"
 #include "emit/protocol/convert.hpp"
 #include "gateway/cigi_host.hpp"
+#include "support/heap_counter.hpp"
 
 namespace emit::server {
 namespace {
@@ -190,8 +191,12 @@ TEST(HostileCigi, WhateverComesFramesAreSoundAndAnswersWellFormed) {
   int frames = 0;
   for (int i = 0; i < 50'000; ++i) {
     now_ns += 10'000'000;
-    gateway.take(host.message(), now_ns);
-    if (gateway.next(*frame, now_ns)) {
+    const auto sent = host.message();
+    const std::uint64_t before = test::heap_request_count();
+    gateway.take(sent, now_ns);
+    const bool came = gateway.next(*frame, now_ns);
+    ASSERT_EQ(test::heap_request_count(), before) << "message " << i;
+    if (came) {
       ++frames;
       ASSERT_TRUE(physics::is_valid(frame->seeker)) << "message " << i;
       ASSERT_EQ(protocol::check_pose(frame->seeker, frame->seeker_rates),
@@ -207,7 +212,9 @@ TEST(HostileCigi, WhateverComesFramesAreSoundAndAnswersWellFormed) {
       ASSERT_LE(std::abs(frame->sim_time_ns), protocol::kMaxSimTimeNs);
       gateway.report({GatewayReport::Kind::published, frame->frame_number});
     }
+    const std::uint64_t before_answers = test::heap_request_count();
     const auto message = gateway.message(now_ns);
+    ASSERT_EQ(test::heap_request_count(), before_answers) << "message " << i;
     if (message.empty()) continue;
     cigi::Reader reader(message, cigi::Sender::ig);
     cigi::Packet packet;
