@@ -111,7 +111,9 @@ glm::dmat3 ThreeAxisGimbal::base_from_payload(const glm::dvec3& angles_rad) cons
 
 glm::dvec3 ThreeAxisGimbal::angles_rad(const glm::dmat3& base_from_payload,
                                        const glm::dvec3& near_rad) const noexcept {
-  const auto [i, j, k] = axes_;
+  const glm::length_t i = axes_[0];
+  const glm::length_t j = axes_[1];
+  const glm::length_t k = axes_[2];
   const auto at = [&](glm::length_t row, glm::length_t column) {
     return base_from_payload[column][row];
   };
