@@ -89,6 +89,46 @@ void check_motion(const Node& table, const MotionConfig& motion, Diagnostics& di
   }
 }
 
+/// Checks that every part has one number and one entity, and hangs on a part of its own entity.
+void check_cigi_parts(const Node& table, const CigiConfig& cigi, Diagnostics& diagnostics) {
+  const auto fault = [&](const std::string& text) {
+    diagnostics.add(key_location(table, "parts"), "'parts': " + text);
+  };
+  constexpr std::size_t kMaxParts = protocol::kMaxEntitiesPerFrame;
+  if (cigi.parts.size() > kMaxParts) {
+    fault(fmt::format("has {} parts, must have {} at most", cigi.parts.size(), kMaxParts));
+    return;
+  }
+  const auto find = [&](std::uint32_t id, std::uint32_t number) {
+    return std::ranges::find_if(cigi.parts, [&](const CigiPartConfig& other) {
+      return other.id == id && other.part == number;
+    });
+  };
+  for (auto part = cigi.parts.begin(); part != cigi.parts.end(); ++part) {
+    const std::string name = fmt::format("part {} of entity {}", part->part, part->id);
+    if (find(part->id, part->part) != part) fault(name + " stands twice");
+    const auto is_same = [&](const auto& other) { return other.entity == part->entity; };
+    if (std::find_if(cigi.parts.begin(), part, is_same) != part ||
+        std::ranges::any_of(cigi.entities, is_same)) {
+      fault(fmt::format("entity {} stands twice", part->entity));
+    }
+    // Follow what carries the part, which ends at the entity.
+    auto link = part;
+    for (std::size_t steps = 0; link != cigi.parts.end() && link->on_part >= 0; ++steps) {
+      if (steps == cigi.parts.size()) {
+        fault(name + " hangs on itself");
+        break;
+      }
+      const auto number = static_cast<std::uint32_t>(link->on_part);
+      const auto carrier = find(part->id, number);
+      if (carrier == cigi.parts.end() && link == part) {
+        fault(fmt::format("{} hangs on part {}, which is not there", name, number));
+      }
+      link = carrier;
+    }
+  }
+}
+
 /// Checks that every entity of the host has one number, and the other way round.
 void check_cigi(const Node& table, const CigiConfig& cigi, Diagnostics& diagnostics) {
   check_endpoint(table, "listen", cigi.listen, false, diagnostics);
@@ -102,6 +142,7 @@ void check_cigi(const Node& table, const CigiConfig& cigi, Diagnostics& diagnost
                                   same_id ? cigi.entities[i].id : cigi.entities[i].entity));
     }
   }
+  check_cigi_parts(table, cigi, diagnostics);
 }
 
 void check_dis(const Node& table, const DisConfig& dis, Diagnostics& diagnostics) {

@@ -16,20 +16,6 @@ using physics::Pose;
 
 namespace {
 
-/// Returns the turn of a body by yaw about z, pitch about y and roll about x, in this order.
-glm::dquat turn_of(double yaw_rad, double pitch_rad, double roll_rad) noexcept {
-  return glm::angleAxis(yaw_rad, glm::dvec3(0.0, 0.0, 1.0)) *
-         glm::angleAxis(pitch_rad, glm::dvec3(0.0, 1.0, 0.0)) *
-         glm::angleAxis(roll_rad, glm::dvec3(1.0, 0.0, 0.0));
-}
-
-/// Returns the pose of a body that is fixed to another one.
-Pose attached(const Pose& parent, const glm::dvec3& offset_body_m,
-              const glm::dquat& turn) noexcept {
-  return {parent.position_world_m + parent.world_from_body * offset_body_m,
-          glm::normalize(parent.world_from_body * turn)};
-}
-
 /// Returns the attitude that is tilted so that the body stands on a slope.
 glm::dquat tilted(const glm::dquat& world_from_body, const glm::dvec3& up,
                   const glm::dvec3& normal) noexcept {
@@ -52,13 +38,23 @@ CigiEntities::CigiEntities(const Georeference& earth, SceneQuery* scene, Options
       scene_(scene),
       options_(std::move(options)),
       places_(std::make_unique<std::array<std::uint16_t, 65536>>()) {
-  entities_.reserve(kMaxEntities);
+  for (const CigiPart::Joint& joint : options_.parts) parts_.emplace_back(joint);
+  entities_.reserve(parts_.size() + kMaxEntities);
   clear();
 }
 
 void CigiEntities::clear() noexcept {
   entities_.clear();
   places_->fill(kNone);
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    parts_[i] = CigiPart(options_.parts[i]);
+    Entity& entity = entities_.emplace_back();
+    entity.part = i;
+    entity.scenario_id = parts_[i].joint().scenario_id;
+    entity.control.state = cigi::EntityState::active;
+    entity.has_place = entity.changed = entity.told = true;
+    entity.known = options_.known(entity.scenario_id);
+  }
   next_ = 0;
   time_ns_ = 0;
   carrier_ = options_.seeker;
@@ -85,7 +81,7 @@ const CigiEntities::Entity* CigiEntities::find(std::uint16_t id) const noexcept 
 
 CigiEntities::Entity* CigiEntities::find_or_make(std::uint16_t id) noexcept {
   if (Entity* entity = find(id)) return entity;
-  if (entities_.size() == kMaxEntities) return nullptr;
+  if (entities_.size() == parts_.size() + kMaxEntities) return nullptr;
   (*places_)[id] = static_cast<std::uint16_t>(entities_.size());
   Entity& entity = entities_.emplace_back();
   entity.id = entity.control.entity_id = id;
@@ -97,6 +93,7 @@ CigiEntities::Entity* CigiEntities::find_or_make(std::uint16_t id) noexcept {
     mapped |= host_id == id;
     taken |= scenario_id == id;
   }
+  for (const CigiPart& part : parts_) taken |= part.joint().scenario_id == id;
   // The carrier of the sensor need not be seen, and 0 means scenery in a scenario.
   entity.known =
       entity.scenario_id != 0 && (mapped || !taken) && options_.known(entity.scenario_id);
@@ -107,6 +104,56 @@ CigiEntities::Entity* CigiEntities::find_or_make(std::uint16_t id) noexcept {
 void CigiEntities::shift(std::int64_t by_ns) noexcept {
   time_ns_ += by_ns;
   for (Entity& entity : entities_) entity.time_ns += by_ns;
+  for (CigiPart& part : parts_) part.shift(by_ns);
+}
+
+CigiEntities::Entity* CigiEntities::find_part(std::uint16_t entity_id,
+                                              std::uint8_t part_id) noexcept {
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    const CigiPart::Joint& joint = parts_[i].joint();
+    if (joint.entity_id == entity_id && joint.part_id == part_id) return &entities_[i];
+  }
+  return nullptr;
+}
+
+const CigiEntities::Entity* CigiEntities::carrier_of(const Entity& entity) const noexcept {
+  if (!entity.part) return find(entity.control.parent_id);
+  const CigiPart::Joint& joint = parts_[*entity.part].joint();
+  if (!joint.on_part) return find(joint.entity_id);
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    const CigiPart::Joint& other = parts_[i].joint();
+    if (other.entity_id == joint.entity_id && other.part_id == *joint.on_part) return &entities_[i];
+  }
+  return nullptr;
+}
+
+void CigiEntities::after_part_packet(Entity& entity) noexcept {
+  const auto state =
+      parts_[*entity.part].is_shown() ? cigi::EntityState::active : cigi::EntityState::standby;
+  if (std::exchange(entity.control.state, state) != state) entity.jumps = true;
+  entity.changed = true;
+}
+
+bool CigiEntities::take(const cigi::ArticulatedPartControl& packet) noexcept {
+  Entity* entity = find_part(packet.entity_id, packet.part_id);
+  if (entity == nullptr) return false;
+  parts_[*entity->part].set(packet, time_ns_);
+  after_part_packet(*entity);
+  return true;
+}
+
+bool CigiEntities::take(const cigi::ShortArticulatedPartControl& packet) noexcept {
+  bool all = true;
+  for (const cigi::PartMotion& motion : packet.motions) {
+    // A freedom that is not used says nothing about its part.
+    if (motion.axis == cigi::PartAxis::none) continue;
+    Entity* entity = find_part(packet.entity_id, motion.part_id);
+    all &= entity != nullptr;
+    if (entity == nullptr) continue;
+    parts_[*entity->part].set(motion, time_ns_);
+    after_part_packet(*entity);
+  }
+  return all;
 }
 
 bool CigiEntities::take(const cigi::EntityControl& packet) noexcept {
@@ -151,8 +198,15 @@ bool CigiEntities::take(const cigi::EntityControl40& packet) noexcept {
 }
 
 bool CigiEntities::take(const cigi::RateControl& packet) noexcept {
+  if (packet.applies_to_part) {
+    Entity* part = find_part(packet.entity_id, packet.part_id);
+    if (part == nullptr) return false;
+    parts_[*part->part].set(packet, time_ns_);
+    part->changed = true;
+    return true;
+  }
   Entity* entity = find(packet.entity_id);
-  if (entity == nullptr || packet.applies_to_part || entity->control.attached) return false;
+  if (entity == nullptr || entity->control.attached) return false;
   move_on(*entity);
   entity->rates = packet;
   entity->changed = true;
@@ -224,16 +278,17 @@ Pose CigiEntities::said_pose(const Entity& entity) const noexcept {
 std::optional<Pose> CigiEntities::pose_of(const Entity& entity, int parents) const noexcept {
   const cigi::EntityControl& control = entity.control;
   if (!entity.has_place || control.state == cigi::EntityState::destroyed) return std::nullopt;
-  if (!control.attached) return pose_on_earth(entity);
-  const Entity* parent = find(control.parent_id);
-  if (parent == nullptr || parents == kMaxParents) return std::nullopt;
-  const auto pose = pose_of(*parent, parents + 1);
+  if (!hangs(entity)) return pose_on_earth(entity);
+  const Entity* carrier = carrier_of(entity);
+  if (carrier == nullptr || parents == kMaxParents) return std::nullopt;
+  const auto pose = pose_of(*carrier, parents + 1);
   if (!pose) return std::nullopt;
+  if (entity.part) return parts_[*entity.part].pose(*pose, time_ns_);
   return attached(
       *pose,
       {control.place.latitude_deg_or_x_m, control.place.longitude_deg_or_y_m,
        control.place.altitude_m_or_z_m},
-      turn_of(control.yaw_deg * kDegree, control.pitch_deg * kDegree, control.roll_deg * kDegree));
+      turn_of(glm::dvec3{control.yaw_deg, control.pitch_deg, control.roll_deg} * kDegree));
 }
 
 std::optional<Pose> CigiEntities::pose_of(std::uint16_t id) const noexcept {
@@ -244,8 +299,16 @@ std::optional<Pose> CigiEntities::pose_of(std::uint16_t id) const noexcept {
 std::optional<Pose> CigiEntities::seeker_pose() const noexcept {
   const auto carrier = pose_of(carrier_);
   if (!carrier) return std::nullopt;
-  const glm::dvec3& turn = view_yaw_pitch_roll_rad_;
-  return attached(*carrier, view_offset_body_m_, turn_of(turn.x, turn.y, turn.z));
+  return attached(*carrier, view_offset_body_m_, turn_of(view_yaw_pitch_roll_rad_));
+}
+
+std::optional<Pose> CigiEntities::pose_of_part(std::uint16_t entity_id,
+                                               std::uint8_t part_id) const noexcept {
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    const CigiPart::Joint& joint = parts_[i].joint();
+    if (joint.entity_id == entity_id && joint.part_id == part_id) return pose_of(entities_[i], 0);
+  }
+  return std::nullopt;
 }
 
 std::optional<std::uint16_t> CigiEntities::parent_of(std::uint16_t id) const noexcept {
@@ -257,6 +320,9 @@ std::optional<std::uint16_t> CigiEntities::parent_of(std::uint16_t id) const noe
 std::uint16_t CigiEntities::host_id_of(std::uint32_t entity_id) const noexcept {
   for (const auto& [host_id, scenario_id] : options_.entities) {
     if (scenario_id == entity_id) return host_id;
+  }
+  for (const CigiPart& part : parts_) {
+    if (part.joint().scenario_id == entity_id) return part.joint().entity_id;
   }
   return static_cast<std::uint16_t>(entity_id);
 }
@@ -270,7 +336,7 @@ std::optional<std::uint16_t> CigiEntities::take_unknown() noexcept {
 
 std::optional<protocol::PoseRates> CigiEntities::rates_of(const Entity& entity,
                                                           const Pose& pose) const noexcept {
-  if (!entity.rates || entity.control.attached) return std::nullopt;
+  if (!entity.rates || hangs(entity)) return std::nullopt;
   const cigi::RateControl& rates = *entity.rates;
   const glm::dvec3 linear_m_s{rates.x_m_s, rates.y_m_s, rates.z_m_s};
   const glm::dvec3 angular_rad_s =
@@ -289,9 +355,18 @@ bool CigiEntities::has_moved(const Entity& entity) const noexcept {
   const Entity* link = &entity;
   for (int parents = 0; parents <= kMaxParents; ++parents) {
     if (link->changed || is_moving(*link)) return true;
-    if (!link->control.attached) return false;
-    link = find(link->control.parent_id);
+    if (!hangs(*link)) return false;
+    link = carrier_of(*link);
     if (link == nullptr) return false;
+  }
+  return false;
+}
+
+bool CigiEntities::jumps_with(const Entity& entity) const noexcept {
+  const Entity* link = &entity;
+  for (int parents = 0; parents <= kMaxParents && link != nullptr; ++parents) {
+    if (link->jumps) return true;
+    link = hangs(*link) ? carrier_of(*link) : nullptr;
   }
   return false;
 }
@@ -300,8 +375,8 @@ bool CigiEntities::is_on(const Entity& entity) const noexcept {
   const Entity* link = &entity;
   for (int parents = 0; parents <= kMaxParents; ++parents) {
     if (link->control.state != cigi::EntityState::active) return false;
-    if (!link->control.attached) return true;
-    link = find(link->control.parent_id);
+    if (!hangs(*link)) return true;
+    link = carrier_of(*link);
     if (link == nullptr) return false;
   }
   return false;
@@ -322,12 +397,17 @@ void CigiEntities::fill(protocol::HostFrameData& frame) noexcept {
     if (has_moved(entity)) {
       entity.marked = true;
       entity.repeats = options_.predicted ? kRepeats : 0;
+      entity.jumps = jumps_with(entity);
     } else if (entity.repeats > 0) {
       entity.marked = true;
       --entity.repeats;
     }
   }
-  for (Entity& entity : entities_) entity.changed = false;
+  for (Entity& entity : entities_) {
+    entity.changed = false;
+    // No frame says so of an entity that the scenario does not have.
+    if (!entity.known) entity.jumps = false;
+  }
   frame.entity_count = 0;
   const std::size_t count = entities_.size();
   for (std::size_t i = 0; i < count && frame.entity_count < protocol::kMaxEntitiesPerFrame; ++i) {

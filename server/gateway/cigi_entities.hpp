@@ -13,12 +13,14 @@
 #include "emit/protocol/cigi/host_packets.hpp"
 #include "emit/protocol/cigi/host_packets4.hpp"
 #include "emit/protocol/host_frame.hpp"
+#include "gateway/cigi_part.hpp"
 #include "gateway/georeference.hpp"
 #include "gateway/scene_query.hpp"
 
 namespace emit::server {
 
-/// Entities of a CIGI host with their parents, rates and clamps, and the view that is the sensor.
+/// Entities of a CIGI host with their parents, parts, rates and clamps, and the view that is the
+/// sensor.
 /// What a host does not send again keeps its last value.
 ///
 /// Thread: one owner. Real time: RT-safe after construction.
@@ -37,6 +39,8 @@ class CigiEntities {
     bool predicted = false;
     /// Entities of the host with their number in the scenario. Others have the same number there.
     std::vector<std::pair<std::uint16_t, std::uint32_t>> entities;
+    /// Articulated parts, each of them an entity of the scenario.
+    std::vector<CigiPart::Joint> parts;
     /// Says whether the scenario has an entity.
     std::function<bool(std::uint32_t entity_id)> known;
   };
@@ -59,8 +63,12 @@ class CigiEntities {
   /// and is seen once the second says so.
   bool take(const protocol::cigi::EntityPosition& packet) noexcept;
   bool take(const protocol::cigi::EntityControl40& packet) noexcept;
-  /// The entity moves by these rates until Entity Control says where it is. Returns false where it
-  /// has no effect: no such entity, rates of a part, or of an entity that is attached.
+  /// Moves a part about its joint. Returns false where it has no effect: no such part.
+  bool take(const protocol::cigi::ArticulatedPartControl& packet) noexcept;
+  bool take(const protocol::cigi::ShortArticulatedPartControl& packet) noexcept;
+  /// The entity moves by these rates until Entity Control says where it is; a part until other
+  /// rates come. Returns false where it has no effect: no such entity or part, or an attached
+  /// entity.
   bool take(const protocol::cigi::RateControl& packet) noexcept;
   /// Returns false where it has no effect: another view, or a group of views.
   bool take(const protocol::cigi::ViewControl& packet) noexcept;
@@ -77,11 +85,14 @@ class CigiEntities {
 
   /// Returns the pose of an entity of the host; none: unknown, destroyed, or its parents are.
   [[nodiscard]] std::optional<physics::Pose> pose_of(std::uint16_t id) const noexcept;
+  [[nodiscard]] std::optional<physics::Pose> pose_of_part(std::uint16_t entity_id,
+                                                          std::uint8_t part_id) const noexcept;
   /// Returns the pose of the sensor; none: its entity has none.
   [[nodiscard]] std::optional<physics::Pose> seeker_pose() const noexcept;
   /// Returns the parent of an entity; none: it has none.
   [[nodiscard]] std::optional<std::uint16_t> parent_of(std::uint16_t id) const noexcept;
-  /// Returns the number that the host has for an entity of the scenario.
+  /// Returns the number that the host has for an entity of the scenario, or for the one whose part
+  /// it is.
   [[nodiscard]] std::uint16_t host_id_of(std::uint32_t entity_id) const noexcept;
   /// Returns an entity that the scenario does not have, which the host has sent since the last
   /// call; each comes once.
@@ -90,6 +101,7 @@ class CigiEntities {
  private:
   struct Entity {
     std::uint16_t id = 0;
+    std::optional<std::size_t> part;  ///< in `parts_`; none: an entity of the host
     protocol::cigi::EntityControl control;
     std::optional<protocol::cigi::RateControl> rates;
     std::int64_t time_ns = 0;     ///< of its place and of the way below
@@ -108,6 +120,14 @@ class CigiEntities {
   [[nodiscard]] Entity* find_or_make(std::uint16_t id) noexcept;
   [[nodiscard]] Entity* find(std::uint16_t id) noexcept;
   [[nodiscard]] const Entity* find(std::uint16_t id) const noexcept;
+  /// Returns the entity that stands for a part; null: there is no such part.
+  [[nodiscard]] Entity* find_part(std::uint16_t entity_id, std::uint8_t part_id) noexcept;
+  [[nodiscard]] static bool hangs(const Entity& entity) noexcept {
+    return entity.part || entity.control.attached;
+  }
+  /// Returns what carries an entity that hangs on another one; null: it is unknown.
+  [[nodiscard]] const Entity* carrier_of(const Entity& entity) const noexcept;
+  void after_part_packet(Entity& entity) noexcept;
   [[nodiscard]] std::optional<physics::Pose> pose_of(const Entity& entity,
                                                      int parents) const noexcept;
   [[nodiscard]] physics::Pose pose_on_earth(const Entity& entity) const noexcept;
@@ -116,17 +136,21 @@ class CigiEntities {
   /// Adds the way by its rates up to now to the entity.
   void move_on(Entity& entity) noexcept;
   [[nodiscard]] bool is_moving(const Entity& entity) const noexcept {
+    if (entity.part) return parts_[*entity.part].is_moving(time_ns_);
     return entity.rates && !entity.control.attached && entity.time_ns != time_ns_;
   }
   [[nodiscard]] std::optional<protocol::PoseRates> rates_of(
       const Entity& entity, const physics::Pose& pose) const noexcept;
   [[nodiscard]] bool has_moved(const Entity& entity) const noexcept;
+  /// Returns true where the entity or what carries it jumps.
+  [[nodiscard]] bool jumps_with(const Entity& entity) const noexcept;
   [[nodiscard]] bool is_on(const Entity& entity) const noexcept;
 
   const Georeference& earth_;
   SceneQuery* scene_;
   Options options_;
-  std::vector<Entity> entities_;  ///< reserved at the start
+  std::vector<CigiPart> parts_;
+  std::vector<Entity> entities_;  ///< parts first; reserved at the start
   static constexpr std::uint16_t kNone = 0xffff;
   std::unique_ptr<std::array<std::uint16_t, 65536>> places_;  ///< by id, in `entities_`
   std::int64_t time_ns_ = 0;

@@ -35,6 +35,16 @@ CigiEntities::Options entity_options(const CigiHost::Options& options) {
   for (const config::CigiEntityConfig& entity : options.cigi.entities) {
     out.entities.emplace_back(static_cast<std::uint16_t>(entity.id), entity.entity);
   }
+  for (const config::CigiPartConfig& part : options.cigi.parts) {
+    CigiPart::Joint joint;
+    joint.entity_id = static_cast<std::uint16_t>(part.id);
+    joint.part_id = static_cast<std::uint8_t>(part.part);
+    joint.scenario_id = part.entity;
+    if (part.on_part >= 0) joint.on_part = static_cast<std::uint8_t>(part.on_part);
+    joint.place_m = part.joint_m;
+    joint.yaw_pitch_roll_rad = part.joint_yaw_pitch_roll_deg * physics::kDegree;
+    out.parts.push_back(joint);
+  }
   out.known = [scenario = options.scenario](std::uint32_t id) {
     return scenario == nullptr ||
            std::ranges::any_of(scenario->objects, [id](const scene::ObjectDesc& object) {
@@ -211,7 +221,7 @@ void CigiHost::take_packet(const cigi::Packet& packet) noexcept {
           if (!entities_.take(in)) no_effect(in, "too many entities");
         } else if constexpr (std::is_same_v<T, cigi::RateControl>) {
           if (!entities_.take(in))
-            no_effect(in, "no such entity, or rates of a part or of an attached entity");
+            no_effect(in, "no such entity or part, or rates of an attached entity");
         } else if constexpr (std::is_same_v<T, cigi::ViewControl>) {
           if (!entities_.take(in)) no_effect(in, "another view than the sensor's");
         } else if constexpr (std::is_same_v<T, cigi::AtmosphereControl>) {
@@ -238,7 +248,7 @@ void CigiHost::take_packet(const cigi::Packet& packet) noexcept {
           take_view(in);
         } else if constexpr (std::is_same_v<T, cigi::ArticulatedPartControl> ||
                              std::is_same_v<T, cigi::ShortArticulatedPartControl>) {
-          no_effect(in, "entities have no moving parts");
+          if (!entities_.take(in)) no_effect(in, "cigi.parts does not have this part");
         } else if constexpr (std::is_same_v<T, cigi::AnimationControl>) {
           no_effect(in, "entities have no animations");
         } else if constexpr (std::is_same_v<T, cigi::AccelerationControl>) {

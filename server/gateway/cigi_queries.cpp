@@ -259,6 +259,9 @@ cigi::Packet CigiQueries::answer_to(const cigi::PositionRequest& request, std::u
   if (request.object_class == cigi::ObjectClass::entity) {
     pose = entities_.pose_of(request.object_id);
     if (const auto id = entities_.parent_of(request.object_id)) parent = entities_.pose_of(*id);
+  } else if (request.object_class == cigi::ObjectClass::articulated_part) {
+    pose = entities_.pose_of_part(request.object_id, request.part_id);
+    parent = entities_.pose_of(request.object_id);
   } else if (request.object_class == cigi::ObjectClass::view) {
     pose = entities_.seeker_pose();
   }

@@ -315,5 +315,41 @@ TEST_F(ConfigTest, overrides_are_sorted_by_the_file_they_belong_to) {
             (std::vector<std::string>{"pacing.rate_hz=1", "scenario=box", "wrong.x=1"}));
 }
 
+std::string cigi_section(const std::string& keys) {
+  return "[cigi]\nlisten = \"127.0.0.1:8000\"\nhost = \"127.0.0.1:8001\"\n" + keys;
+}
+
+TEST_F(ConfigTest, parts_of_a_cigi_host_are_read_and_printed) {
+  const auto result =
+      daemon(kCanned + cigi_section("entities = [{ id = 12, entity = 1 }]\n"
+                                    "parts = [{ id = 12, part = 2, entity = 3, on_part = 1 },\n"
+                                    "  { id = 12, part = 1, entity = 2, joint_m = [0.5, 0, -2], "
+                                    "joint_yaw_pitch_roll_deg = [0, 90, 0] }]\n"));
+  ASSERT_TRUE(result.has_value()) << result.error().text;
+  EXPECT_EQ(print_daemon(*daemon(print_daemon(*result))), print_daemon(*result));
+  ASSERT_EQ(result->cigi.parts.size(), 2U);
+  EXPECT_EQ(result->cigi.parts[0].on_part, 1);
+  EXPECT_EQ(result->cigi.parts[1].on_part, -1);
+  EXPECT_EQ(result->cigi.parts[1].joint_m, glm::dvec3(0.5, 0.0, -2.0));
+  EXPECT_EQ(result->cigi.parts[1].joint_yaw_pitch_roll_deg, glm::dvec3(0.0, 90.0, 0.0));
+}
+
+TEST_F(ConfigTest, parts_of_a_cigi_host_hang_on_something_and_stand_once) {
+  const auto fault = [&](const std::string& parts) {
+    return daemon_error(cigi_section("entities = [{ id = 9, entity = 1 }]\nparts = " + parts));
+  };
+  EXPECT_THAT(fault("[{ id = 1, part = 1, entity = 2, on_part = 7 }]\n"),
+              ::testing::HasSubstr("part 1 of entity 1 hangs on part 7, which is not there"));
+  EXPECT_THAT(fault("[{ id = 1, part = 1, entity = 2, on_part = 2 },\n"
+                    " { id = 1, part = 2, entity = 3, on_part = 1 }]\n"),
+              ::testing::HasSubstr("hangs on itself"));
+  EXPECT_THAT(fault("[{ id = 1, part = 1, entity = 2 }, { id = 1, part = 1, entity = 3 }]\n"),
+              ::testing::HasSubstr("part 1 of entity 1 stands twice"));
+  EXPECT_THAT(fault("[{ id = 1, part = 1, entity = 2 }, { id = 2, part = 1, entity = 2 }]\n"),
+              ::testing::HasSubstr("entity 2 stands twice"));
+  EXPECT_THAT(fault("[{ id = 1, part = 1, entity = 1 }]\n"),
+              ::testing::HasSubstr("entity 1 stands twice"));
+}
+
 }  // namespace
 }  // namespace emit::config::testing

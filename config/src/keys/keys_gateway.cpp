@@ -17,6 +17,26 @@ const KeyTable<CigiEntityConfig>& cigi_entity_keys() {
   return keys;
 }
 
+const KeyTable<CigiPartConfig>& cigi_part_keys() {
+  constexpr std::int64_t kMaxPart = 255;
+  static const KeyTable<CigiPartConfig> keys = {
+      required(integer<CigiPartConfig>("id", "", 0, kMaxId, EMIT_FIELD(id),
+                                       "Number that the host has for the entity of the part.")),
+      required(integer<CigiPartConfig>("part", "", 0, kMaxPart, EMIT_FIELD(part),
+                                       "Number that the host has for the part.")),
+      required(integer<CigiPartConfig>("entity", "", 1, 4294967295, EMIT_FIELD(entity),
+                                       "Number in the scenario, where the part is an entity.")),
+      integer<CigiPartConfig>("on_part", "", -1, kMaxPart, EMIT_FIELD(on_part),
+                              "Part that carries this one. -1: the entity does."),
+      vector3<CigiPartConfig>("joint_m", "m", EMIT_FIELD(joint_m),
+                              "Origin of the part in the axes of what carries it."),
+      vector3<CigiPartConfig>("joint_yaw_pitch_roll_deg", "deg",
+                              EMIT_FIELD(joint_yaw_pitch_roll_deg),
+                              "Axes of the part at rest against those of what carries it."),
+  };
+  return keys;
+}
+
 const KeyTable<DisEntityConfig>& dis_entity_keys() {
   static const KeyTable<DisEntityConfig> keys = {
       required(text<DisEntityConfig>("id", EMIT_FIELD(id),
@@ -93,6 +113,15 @@ const KeyTable<CigiConfig>& cigi_keys() {
                        diagnostics);
           },
           [](const CigiConfig& in) { return write_array(in.entities, cigi_entity_keys()); }),
+      custom<CigiConfig>(
+          {"parts", "array of tables", "", "at most 128",
+           "Articulated parts: `id`, `part`, `entity`, `on_part`, `joint_m`, "
+           "`joint_yaw_pitch_roll_deg`.",
+           false},
+          [](CigiConfig& out, const Node& node, Diagnostics& diagnostics) {
+            read_array(node, "parts", cigi_part_keys(), CigiPartConfig{}, out.parts, diagnostics);
+          },
+          [](const CigiConfig& in) { return write_array(in.parts, cigi_part_keys()); }),
   };
   return keys;
 }

@@ -4,7 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "gateway/cigi_host.hpp"
@@ -23,9 +25,23 @@ struct Made {
   std::string notes;
 };
 
+/// Returns a fault where the configuration names an entity that the scenario lacks.
+std::optional<Error> check_entity(const scene::ScenarioDesc* scenario, std::uint32_t entity_id,
+                                  std::string_view key) {
+  const auto is_it = [&](const scene::ObjectDesc& object) { return object.entity_id == entity_id; };
+  if (scenario == nullptr || std::ranges::any_of(scenario->objects, is_it)) return std::nullopt;
+  return Error{physics::ErrorCode::config,
+               fmt::format("{}: the scenario has no entity {}", key, entity_id)};
+}
+
 Result<Made> make_cigi(Context& context, const config::DaemonConfig& config,
                        const scene::ScenarioDesc* scenario) {
   Made out{nullptr, "protocol=cigi"};
+  for (const config::CigiPartConfig& part : config.cigi.parts) {
+    if (auto fault = check_entity(scenario, part.entity, "cigi.parts")) {
+      return tl::unexpected<Error>(std::move(*fault));
+    }
+  }
   std::unique_ptr<SceneQuery> scene;
   if (scenario != nullptr) {
     auto query = SceneQuery::create(*scenario);
@@ -55,13 +71,8 @@ Result<Made> make_dis(Context& context, const config::DaemonConfig& config,
                       const scene::ScenarioDesc* scenario) {
   // The configuration names the entities, so that one that the scenario lacks is a mistake.
   for (const config::DisEntityConfig& entity : config.dis.entities) {
-    const auto is_it = [&](const scene::ObjectDesc& object) {
-      return object.entity_id == entity.entity;
-    };
-    if (scenario != nullptr && std::ranges::none_of(scenario->objects, is_it)) {
-      return physics::make_error(
-          physics::ErrorCode::config,
-          fmt::format("dis.entities: the scenario has no entity {}", entity.entity));
+    if (auto fault = check_entity(scenario, entity.entity, "dis.entities")) {
+      return tl::unexpected<Error>(std::move(*fault));
     }
   }
   Made out{nullptr, fmt::format("protocol=dis exercise={}", config.dis.exercise)};

@@ -268,5 +268,181 @@ TEST_F(CigiEntitiesTest, ThereIsAnEndToEntities) {
   EXPECT_TRUE(entities.take(entity_at(60'000, kOrigin)));
 }
 
+class CigiPartsTest : public CigiEntitiesTest {
+ protected:
+  static constexpr std::uint16_t kTank = 12;
+  static constexpr std::uint8_t kTurret = 1;
+  static constexpr std::uint8_t kGun = 2;
+
+  /// A tank whose turret is entity 21 and whose gun, on the turret, is entity 22.
+  CigiEntities make_tank() {
+    CigiEntities::Options options;
+    options.known = [](std::uint32_t id) { return id == kTank || id == 21 || id == 22; };
+    CigiPart::Joint turret{kTank, kTurret, 21, {}, {0.5, 0.0, -2.0}, {}};
+    CigiPart::Joint gun{kTank, kGun, 22, kTurret, {1.0, 0.0, -0.25}, {}};
+    options.parts = {gun, turret};  // in no order
+    return {earth_, nullptr, std::move(options)};
+  }
+  static cigi::ShortArticulatedPartControl turned(float turret_yaw_deg, float gun_pitch_deg) {
+    cigi::ShortArticulatedPartControl out;
+    out.entity_id = kTank;
+    out.motions = {{{kTurret, cigi::PartAxis::yaw, true, turret_yaw_deg},
+                    {kGun, cigi::PartAxis::pitch, true, gun_pitch_deg}}};
+    return out;
+  }
+  /// Returns the state of an entity in a frame; null: the frame does not have it.
+  static const protocol::EntityStateData* state_of(const protocol::HostFrameData& frame,
+                                                   std::uint32_t id) {
+    for (const protocol::EntityStateData& state : frame.entity_span()) {
+      if (state.entity_id == id) return &state;
+    }
+    return nullptr;
+  }
+};
+
+TEST_F(CigiPartsTest, PartsStandAtTheirJointsAndTurnAboutThem) {
+  CigiEntities entities = make_tank();
+  // The tank heads east: its x is east, its y south, its z down.
+  ASSERT_TRUE(entities.take(entity_at(0, kOrigin)));
+  ASSERT_TRUE(entities.take(entity_at(kTank, kOrigin, 90.0F)));
+  const auto* gun = state_of(fill(entities), 22);
+  ASSERT_NE(gun, nullptr) << "parts are there before a packet moves them";
+  EXPECT_LT(glm::distance(gun->pose.position_world_m, glm::dvec3(1.5, 0.0, 2.25)), 1e-6);
+  EXPECT_TRUE(gun->on);
+  // A quarter turn to the right points the turret south; the gun is raised by 30 degrees.
+  ASSERT_TRUE(entities.take(turned(90.0F, 30.0F)));
+  gun = state_of(fill(entities), 22);
+  ASSERT_NE(gun, nullptr);
+  EXPECT_FALSE(gun->teleport);
+  EXPECT_LT(glm::distance(gun->pose.position_world_m, glm::dvec3(0.5, -1.0, 2.25)), 1e-6);
+  const glm::dvec3 barrel = gun->pose.world_from_body * glm::dvec3(1.0, 0.0, 0.0);
+  EXPECT_LT(glm::distance(barrel, glm::dvec3(0.0, -std::cos(30.0 * kDegree), 0.5)), 1e-9);
+  EXPECT_EQ(fill(entities).entity_count, 0U) << "nothing moves";
+}
+
+TEST_F(CigiPartsTest, PartsFollowTheirEntityAndVanishWithIt) {
+  CigiEntities entities = make_tank();
+  ASSERT_TRUE(entities.take(entity_at(0, kOrigin)));
+  EXPECT_FALSE(entities.pose_of_part(kTank, kGun)) << "the tank has no place yet";
+  ASSERT_TRUE(entities.take(entity_at(kTank, kOrigin, 90.0F)));
+  (void)fill(entities);
+  auto moved = entity_at(kTank, kOrigin, 90.0F);
+  moved.place.altitude_m_or_z_m += 3.0;
+  ASSERT_TRUE(entities.take(moved));
+  const auto* gun = state_of(fill(entities), 22);
+  ASSERT_NE(gun, nullptr);
+  EXPECT_NEAR(gun->pose.position_world_m.z, 5.25, 1e-6);
+  moved.state = cigi::EntityState::destroyed;
+  ASSERT_TRUE(entities.take(moved));
+  gun = state_of(fill(entities), 22);
+  ASSERT_NE(gun, nullptr);
+  EXPECT_FALSE(gun->on);
+  // The tank comes back elsewhere, and its parts do not travel there.
+  moved.state = cigi::EntityState::active;
+  moved.place.altitude_m_or_z_m += 100.0;
+  ASSERT_TRUE(entities.take(moved));
+  gun = state_of(fill(entities), 22);
+  ASSERT_NE(gun, nullptr);
+  EXPECT_TRUE(gun->on);
+  EXPECT_TRUE(gun->teleport);
+}
+
+TEST_F(CigiPartsTest, AHiddenPartHidesWhatItCarries) {
+  CigiEntities entities = make_tank();
+  ASSERT_TRUE(entities.take(entity_at(0, kOrigin)));
+  ASSERT_TRUE(entities.take(entity_at(kTank, kOrigin)));
+  cigi::ArticulatedPartControl hide;
+  hide.entity_id = kTank;
+  hide.part_id = kTurret;
+  ASSERT_TRUE(entities.take(hide));
+  const protocol::HostFrameData& frame = fill(entities);
+  ASSERT_NE(state_of(frame, 21), nullptr);
+  EXPECT_FALSE(state_of(frame, 21)->on);
+  ASSERT_NE(state_of(frame, 22), nullptr);
+  EXPECT_FALSE(state_of(frame, 22)->on);
+  EXPECT_TRUE(state_of(frame, kTank)->on);
+}
+
+TEST_F(CigiPartsTest, RatesTurnAPartUntilOtherRatesCome) {
+  constexpr std::int64_t kSecondNs = 1'000'000'000;
+  CigiEntities entities = make_tank();
+  ASSERT_TRUE(entities.take(entity_at(0, kOrigin)));
+  ASSERT_TRUE(entities.take(entity_at(kTank, kOrigin, 90.0F)));
+  cigi::RateControl rates;
+  rates.entity_id = kTank;
+  rates.part_id = kTurret;
+  rates.applies_to_part = true;
+  rates.yaw_deg_s = 200.0F;  // further than half a turn between packets
+  ASSERT_TRUE(entities.take(rates));
+  (void)fill(entities);
+  const auto heading_deg = [&](std::int64_t time_ns) {
+    entities.set_time(time_ns);
+    const auto* turret = state_of(fill(entities), 21);
+    if (turret == nullptr) return -1.0;
+    const glm::dvec3 x = turret->pose.world_from_body * glm::dvec3(1.0, 0.0, 0.0);
+    return std::fmod(std::atan2(x.x, x.y) / kDegree + 360.0, 360.0);
+  };
+  EXPECT_NEAR(heading_deg(kSecondNs), 290.0, 1e-6);
+  // A packet for the pitch of the gun does not stop the turret.
+  ASSERT_TRUE(entities.take(cigi::ShortArticulatedPartControl{
+      kTank, {{{kGun, cigi::PartAxis::pitch, true, 10.0F}, {}}}}));
+  EXPECT_NEAR(heading_deg(2 * kSecondNs), 130.0, 1e-6);
+  rates.yaw_deg_s = 0.0F;
+  ASSERT_TRUE(entities.take(rates));
+  EXPECT_NEAR(heading_deg(3 * kSecondNs), 130.0, 1e-6);
+  entities.set_time(4 * kSecondNs);
+  EXPECT_EQ(fill(entities).entity_count, 0U);
+}
+
+TEST_F(CigiPartsTest, WaysAreAlongTheJointAndTheirLocalRatesAlongThePart) {
+  CigiEntities entities = make_tank();
+  ASSERT_TRUE(entities.take(entity_at(kTank, kOrigin, 90.0F)));
+  cigi::ArticulatedPartControl turret;
+  turret.entity_id = kTank;
+  turret.part_id = kTurret;
+  turret.part_enabled = turret.x_enabled = turret.yaw_enabled = true;
+  turret.x_m = 0.25F;
+  turret.yaw_deg = 90.0F;
+  ASSERT_TRUE(entities.take(turret));
+  auto pose = entities.pose_of_part(kTank, kTurret);
+  ASSERT_TRUE(pose);
+  EXPECT_LT(glm::distance(pose->position_world_m, glm::dvec3(0.75, 0.0, 2.0)), 1e-6);
+  cigi::RateControl rates;
+  rates.entity_id = kTank;
+  rates.part_id = kTurret;
+  rates.applies_to_part = rates.local = true;
+  rates.x_m_s = 2.0F;
+  ASSERT_TRUE(entities.take(rates));
+  entities.set_time(500'000'000);
+  pose = entities.pose_of_part(kTank, kTurret);
+  ASSERT_TRUE(pose);
+  EXPECT_LT(glm::distance(pose->position_world_m, glm::dvec3(0.75, -1.0, 2.0)), 1e-6)
+      << "the part looks south, and moves there";
+}
+
+TEST_F(CigiPartsTest, PartsThatAreNotConfiguredHaveNoEffect) {
+  CigiEntities entities = make_tank();
+  ASSERT_TRUE(entities.take(entity_at(kTank, kOrigin)));
+  cigi::ArticulatedPartControl packet;
+  packet.entity_id = kTank;
+  packet.part_id = 9;
+  EXPECT_FALSE(entities.take(packet));
+  packet.entity_id = 13;
+  packet.part_id = kTurret;
+  EXPECT_FALSE(entities.take(packet));
+  cigi::RateControl rates;
+  rates.entity_id = kTank;
+  rates.part_id = 9;
+  rates.applies_to_part = true;
+  EXPECT_FALSE(entities.take(rates));
+  // The entity of a part is not also one of the host's own.
+  ASSERT_TRUE(entities.take(entity_at(0, kOrigin)));
+  ASSERT_TRUE(entities.take(entity_at(21, kOrigin)));
+  std::size_t count = 0;
+  const protocol::HostFrameData& frame = fill(entities);
+  for (const auto& state : frame.entity_span()) count += state.entity_id == 21 ? 1 : 0;
+  EXPECT_EQ(count, 1U);
+}
+
 }  // namespace
 }  // namespace emit::server

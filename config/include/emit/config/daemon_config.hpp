@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <glm/ext/vector_double3.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -86,6 +87,16 @@ struct CigiEntityConfig {
   std::uint32_t entity = 0;  ///< number in the scenario
 };
 
+/// An articulated part of an entity of a CIGI host, which is an entity of its own in the scenario.
+struct CigiPartConfig {
+  std::uint32_t id = 0;       ///< number that the host has for the entity that it is part of
+  std::uint32_t part = 0;     ///< number that the host has for the part
+  std::uint32_t entity = 0;   ///< number in the scenario
+  std::int32_t on_part = -1;  ///< part that carries it; -1: the entity does
+  glm::dvec3 joint_m{0.0};    ///< place of its origin in the axes of what carries it
+  glm::dvec3 joint_yaw_pitch_roll_deg{0.0};  ///< its axes at rest against those
+};
+
 /// A host that speaks CIGI.
 struct CigiConfig {
   std::string listen;          ///< address:port for its messages; empty: there is none
@@ -95,6 +106,7 @@ struct CigiConfig {
   std::uint32_t view = 0;      ///< view that is the sensor
   std::uint32_t database = 1;  ///< number of the scenario among the host's databases; 0: none
   std::vector<CigiEntityConfig> entities;
+  std::vector<CigiPartConfig> parts;
 
   [[nodiscard]] bool enabled() const noexcept { return !listen.empty(); }
 };
