@@ -7,6 +7,7 @@
 #include "overrides.hpp"
 #include "resolve/complete_weather.hpp"
 #include "resolve/resolve.hpp"
+#include "tables/weather_year.hpp"
 
 namespace emit::config {
 
@@ -71,6 +72,15 @@ void complete_table(const Node& table, const std::filesystem::path& file, Scenar
   }
 }
 
+/// Reads a weather file of any format.
+Result<std::vector<scene::WeatherSample>> load_weather(const std::filesystem::path& file,
+                                                       ScenarioDesc& scenario) {
+  if (!is_weather_year(file)) return load_weather_csv(file);
+  const auto year = load_weather_year(file);
+  if (!year) return tl::unexpected<physics::Error>(year.error());
+  return weather_of_year(*year, file.string(), scenario, scenario.warnings);
+}
+
 /// Reads the weather. The thermal options say how far back it has to reach.
 void resolve_weather(const Node& root, ScenarioDesc& scenario, Diagnostics& diagnostics) {
   const Node& table = section(root, "weather", diagnostics);
@@ -85,7 +95,7 @@ void resolve_weather(const Node& root, ScenarioDesc& scenario, Diagnostics& diag
     return;
   }
   if (has_file) {
-    auto loaded = load_weather_csv(draft.file);
+    auto loaded = load_weather(draft.file, scenario);
     if (!loaded) {
       report_file_error(loaded.error(), table, "file", diagnostics);
       return;

@@ -119,9 +119,11 @@ const KeyTable<WeatherSample>& weather_sample_keys() {
 
 const KeyTable<WeatherDraft>& weather_keys() {
   static const KeyTable<WeatherDraft> keys = {
-      path<WeatherDraft>("file", EMIT_FIELD(file),
-                         "CSV file with the columns of `[[weather.sample]]`. Without file and "
-                         "samples the clear-sky models below make the weather."),
+      path<WeatherDraft>(
+          "file", EMIT_FIELD(file),
+          "CSV file with the columns of `[[weather.sample]]`, or a typical year (EPW, "
+          "TMY3). Without file and samples the clear-sky models below make the "
+          "weather."),
       number<WeatherDraft>("linke_turbidity", "", between(1, 10),
                            EMIT_FIELD(clear_sky.linke_turbidity),
                            "Clear-sky models: Linke turbidity of the Ineichen model."),
