@@ -6,26 +6,31 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 #include "emit/physics/check.hpp"
 
 namespace emit::renderer {
 namespace {
 
-/// Record of one draw. Normals transform by the cofactors of the matrix.
+/// Record of one draw. Normals transform by the cofactors of the matrix. `stand` is null for static
+/// objects.
 DrawRecord record_of(const glm::dmat4& clip_from_relworld, const glm::dmat4& relworld_from_mesh,
-                     std::uint32_t object, std::uint32_t material, bool moves) noexcept {
+                     std::uint32_t object, std::uint32_t material,
+                     const EntityStand* stand) noexcept {
   DrawRecord record{};
   record.params.clip_from_mesh = glm::mat4(clip_from_relworld * relworld_from_mesh);
   const glm::dmat3 m(relworld_from_mesh);
   const std::array<glm::dvec3, 3> cofactors = {glm::cross(m[1], m[2]), glm::cross(m[2], m[0]),
                                                glm::cross(m[0], m[1])};
   for (std::size_t column = 0; column < cofactors.size(); ++column) {
-    record.params.normal_from_mesh[column] = glm::vec4(glm::vec3(cofactors[column]), 0.0F);
+    const float up = stand != nullptr ? stand->up_body[static_cast<glm::length_t>(column)] : 0.0F;
+    record.params.normal_from_mesh[column] = glm::vec4(glm::vec3(cofactors[column]), up);
   }
   record.params.material = material;
   record.params.object = object + 1;
-  record.params.moves = moves ? 1U : 0U;
+  record.params.moves = stand != nullptr ? 1U : 0U;
+  record.params.moved_frac = stand != nullptr ? stand->moved_frac : 0.0F;
   return record;
 }
 
@@ -63,8 +68,9 @@ scene::Aabb shifted(const scene::Aabb& box, const glm::dvec3& by_m) noexcept {
 }  // namespace
 
 DrawLists::DrawLists(const SceneBuffers& scene, std::span<const std::int32_t> history_of_object,
-                     std::uint32_t max_passes, TriangleCull* cull)
-    : scene_(scene), cull_(cull), max_passes_(max_passes) {
+                     std::uint32_t max_passes, TriangleCull* cull,
+                     std::vector<EntityAnchor> anchors)
+    : scene_(scene), cull_(cull), max_passes_(max_passes), anchors_(std::move(anchors)) {
   const auto instances = scene.instances();
   std::size_t view_ranges = 0;
   std::size_t submesh_instances = 0;
@@ -93,6 +99,8 @@ DrawLists::DrawLists(const SceneBuffers& scene, std::span<const std::int32_t> hi
     }
   }
   light_placed_ = view_placed_;
+  stands_.resize(entities_);
+  EMIT_CHECK(anchors_.empty() || anchors_.size() >= entities_);
   // Allocate for the worst case, so that a frame allocates nothing.
   records_.reserve(std::max<std::size_t>(1, submesh_instances));
   light_records_.reserve(std::max<std::size_t>(1, instances.size() * max_passes));
@@ -134,6 +142,8 @@ void DrawLists::begin(const glm::dvec3& camera_world_m, std::int64_t sim_time_ns
   for (const std::uint32_t i : moving_) {
     const PoseHistory& entity = entities[static_cast<std::size_t>(history_of_instance_[i])];
     const TrajectoryState state = entity.at(sim_time_ns);
+    const auto m = static_cast<std::size_t>(history_of_instance_[i]);
+    if (!anchors_.empty()) stands_[m] = stand_of(state.pose, anchors_[m]);
     view_placed_[i] =
         place(i, scene::world_from_body_matrix(state.pose) * instances[i].body_from_mesh, state.on);
     light_placed_[i] = view_placed_[i];
@@ -243,9 +253,11 @@ void DrawLists::cull_view(const ViewVolume& view, const LevelLimits& limits,
           const glm::dmat4 matrix = relworld_from_mesh(view_placed_[i]);
           const auto first = static_cast<std::uint32_t>(view_ranges_.index_count.size());
           const auto record = static_cast<std::uint32_t>(records_.size());
+          const std::int32_t entity = history_of_instance_[i];
+          const EntityStand* stand =
+              entity >= 0 ? &stands_[static_cast<std::size_t>(entity)] : nullptr;
           records_.push_back(record_of(view.clip_from_relworld, matrix,
-                                       scene_.instances()[i].object, submesh.material,
-                                       history_of_instance_[i] >= 0));
+                                       scene_.instances()[i].object, submesh.material, stand));
           add_ranges(i, submesh, ClusterView(view, matrix, limits),
                      records_.back().params.clip_from_mesh);
           const auto count = static_cast<std::uint32_t>(view_ranges_.index_count.size()) - first;

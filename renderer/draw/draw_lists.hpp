@@ -7,6 +7,7 @@
 #include "draw/cluster_view.hpp"
 #include "draw/light_fit.hpp"
 #include "draw/scene_buffers.hpp"
+#include "history/entity_stand.hpp"
 #include "history/pose_history.hpp"
 
 namespace emit::renderer {
@@ -46,10 +47,11 @@ class DrawLists {
   /// `history_of_object` holds the entity of each object, an index of the spans that begin() takes,
   /// or -1 for a static object. `max_passes` is the largest number of shadow passes (steps x
   /// cascades) of a frame. `cull` is null or the object that the buffers were made with. The lists
-  /// keep references to `scene` and `cull`.
+  /// keep references to `scene` and `cull`. `anchors` are the poses, by entity, for which the views
+  /// of the samples were found; they are empty where vertices are no samples.
   /// @pre history_of_object has an entry for the object of every instance.
   DrawLists(const SceneBuffers& scene, std::span<const std::int32_t> history_of_object,
-            std::uint32_t max_passes, TriangleCull* cull);
+            std::uint32_t max_passes, TriangleCull* cull, std::vector<EntityAnchor> anchors = {});
 
   /// Starts a frame. Places all instances at `sim_time_ns` around a camera at `camera_world_m`.
   /// @pre `entities` has an entry for every entity of the constructor.
@@ -131,7 +133,9 @@ class DrawLists {
   std::vector<std::uint32_t> moving_;              ///< instances of entities
   std::vector<double> size_of_instance_m_;         ///< longest side of its box
   std::vector<Placed> view_placed_;  ///< one per instance, for the camera; static ones never change
-  std::vector<Placed> light_placed_;  ///< one per instance, for the shadow passes that follow
+  std::vector<Placed> light_placed_;   ///< one per instance, for the shadow passes that follow
+  std::vector<EntityAnchor> anchors_;  ///< by entity, or empty
+  std::vector<EntityStand> stands_;    ///< by entity, at the instant of the frame
   scene::Aabb static_bounds_world_;
   std::vector<DrawRecord> records_;
   std::vector<LightRecord> light_records_;

@@ -123,6 +123,10 @@ SceneBuffers::SceneBuffers(SampledScene scene, TriangleCull* cull)
   }
   positions_ = storage(positions);
   normals_ = storage(normals);
+  if (scene.hull.empty()) return;
+  std::vector<Normal> hulls;
+  for (const glm::vec4& hull : scene.hull) hulls.push_back(packed(glm::vec3(hull), hull.w));
+  hulls_ = storage(hulls);
 }
 
 }  // namespace emit::renderer

@@ -74,6 +74,9 @@ class SceneBuffers {
   [[nodiscard]] GLuint positions() const noexcept { return positions_.id(); }
   [[nodiscard]] GLuint normals() const noexcept { return normals_.id(); }
   [[nodiscard]] GLuint indices() const noexcept { return indices_.id(); }
+  /// GL name of the openings of hulls; 0 in a scene without entities and where vertices are no
+  /// samples.
+  [[nodiscard]] GLuint hulls() const noexcept { return hulls_.id(); }
 
  private:
   /// Adds index ranges and indices of all meshes, with space for `room` more indices behind them.
@@ -87,6 +90,7 @@ class SceneBuffers {
   std::vector<ClusterLevel> levels_;
   gl::Buffer positions_;  ///< float32 x 3, mesh coordinates
   gl::Buffer normals_;    ///< snorm16 x 4; in a sampled scene the fourth is the share of the sky
+  gl::Buffer hulls_;      ///< snorm16 x 4: SampledScene::hull
   gl::Buffer indices_;    ///< uint32
   std::uint32_t first_culled_ = 0;
   std::size_t culled_room_ = 0;  ///< indices that fit behind first_culled_

@@ -40,6 +40,13 @@ SceneVertexArrays::SceneVertexArrays(const SceneBuffers& scene, const gl::Buffer
   glVertexArrayAttribBinding(view, EMIT_ATTR_NORMAL, 1);
   glEnableVertexArrayAttrib(view, EMIT_ATTR_NORMAL);
   read_records(light_.id(), light_records);
+  // Read the openings of hulls where there are entities.
+  if (scene.hulls() == 0) return;
+  constexpr GLuint kHullBinding = 6;
+  glVertexArrayVertexBuffer(view, kHullBinding, scene.hulls(), 0, 4 * sizeof(std::int16_t));
+  glVertexArrayAttribFormat(view, EMIT_ATTR_HULL, 4, GL_SHORT, GL_TRUE, 0);
+  glVertexArrayAttribBinding(view, EMIT_ATTR_HULL, kHullBinding);
+  glEnableVertexArrayAttrib(view, EMIT_ATTR_HULL);
 }
 
 void SceneVertexArrays::read_nodes(const gl::Buffer& before,

@@ -188,8 +188,8 @@ physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
   refined_eyes_ = eyes_around(surface_->model().eyes, static_bounds_);
   // Send the meshes to the device. Release the memory of the old ones first.
   drawn_.reset();
-  drawn_ =
-      std::make_unique<DrawnScene>(surface_->take_drawn_scene(), history_of_object_, software_);
+  drawn_ = std::make_unique<DrawnScene>(surface_->take_drawn_scene(), history_of_object_,
+                                        surface_->anchors(), software_);
   // Allocate the buffers of the samples.
   for (gl::Buffer& node : node_buffers_) {
     node = gl::Buffer::dynamic(surface_->model().drawn_samples * sizeof(SampleVertex));

@@ -14,10 +14,10 @@ DrawnScene::DrawnScene(scene::SceneGeometry scene, std::span<const std::int32_t>
       vertices(buffers, light_record_buffer) {}
 
 DrawnScene::DrawnScene(SampledScene scene, std::span<const std::int32_t> history_of_object,
-                       bool software)
+                       std::vector<EntityAnchor> anchors, bool software)
     : cull(software ? std::make_unique<TriangleCull>() : nullptr),
       buffers(std::move(scene), cull.get()),
-      lists(buffers, history_of_object, 0, cull.get()),
+      lists(buffers, history_of_object, 0, cull.get(), std::move(anchors)),
       record_buffer(gl::Buffer::dynamic(lists.max_records() * sizeof(DrawRecord))),
       light_record_buffer(gl::Buffer::dynamic(lists.max_light_records() * sizeof(LightRecord))),
       vertices(buffers, light_record_buffer) {}

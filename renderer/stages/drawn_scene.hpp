@@ -20,9 +20,11 @@ struct DrawnScene {
   /// DrawLists.
   DrawnScene(scene::SceneGeometry scene, std::span<const std::int32_t> history_of_object,
              std::uint32_t max_passes);
-  /// Scene of thermal samples, without shadow maps. `software` says that the rasteriser runs on a
-  /// CPU, where a small triangle costs as much as a large one; then triangles are culled here.
-  DrawnScene(SampledScene scene, std::span<const std::int32_t> history_of_object, bool software);
+  /// Scene of thermal samples, without shadow maps. `anchors` are those of DrawLists. `software`
+  /// says that the rasteriser runs on a CPU, where a small triangle costs as much as a large one;
+  /// then triangles are culled here.
+  DrawnScene(SampledScene scene, std::span<const std::int32_t> history_of_object,
+             std::vector<EntityAnchor> anchors, bool software);
   DrawnScene(const DrawnScene&) = delete;
   DrawnScene& operator=(const DrawnScene&) = delete;
 

@@ -19,6 +19,9 @@ layout(location = EMIT_ATTR_NODE_AFTER) in vec2 node_after;
 // Temperature in K that recent shade of entities has taken off the sample in full sun. It is added back here, because
 // passes/shade.comp subtracts the shade of each pixel.
 layout(location = EMIT_ATTR_SHADE) in float shade_k;
+// Opening of the own hull of an entity: half of its share of the hemisphere, and the part of the sky in it per component
+// of the zenith in the body frame.
+layout(location = EMIT_ATTR_HULL) in vec4 hull;
 #endif
 // Temperature in K, share of the sun, share of the sky, cosine of the sun's incidence on the front.
 out vec4 sample_state;
@@ -36,8 +39,14 @@ void main() {
   vec2 now = mix(node_before, node_after, frame.node_frac);
 #ifdef EMIT_SHADE
   now.x += shade_k * now.y * max(cosine, 0.0);
+  // Take the share of the sky at the attitude of the frame, as far as the entity has moved (view_of_now.hpp).
+  vec3 up = vec3(draw.normal_from_mesh[0].w, draw.normal_from_mesh[1].w, draw.normal_from_mesh[2].w);
+  float past_hull = clamp(hull.x + dot(hull.yzw, up), 0.0, 2.0 * hull.x);
+  float sky_frac = mix(normal_mesh.w, past_hull, draw.moved_frac);
+#else
+  float sky_frac = normal_mesh.w;
 #endif
-  sample_state = vec4(frame.reference_k + now.x, now.y, normal_mesh.w, cosine);
+  sample_state = vec4(frame.reference_k + now.x, now.y, sky_frac, cosine);
 #else
   normal_relworld = n;
 #endif

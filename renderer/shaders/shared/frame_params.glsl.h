@@ -38,11 +38,13 @@ struct FrameParams {
 // Uniform block of one draw: one submesh of one instance.
 struct DrawParams {
   mat4 clip_from_mesh;       // reversed depth, infinite far plane; row 0 of the image lies at NDC y = -1
-  vec4 normal_from_mesh[3];  // columns in xyz: the cofactors of relworld_from_mesh, which hold for unequal scales too
+  // Columns in xyz: the cofactors of relworld_from_mesh, which hold for unequal scales too. cached: w is a component of
+  // the unit vector to the zenith in the body frame of an entity.
+  vec4 normal_from_mesh[3];
   uint material;
   uint object;               // 1 + index of the scenario's object
   uint moves;                // 1: the object is an entity; 0: it is static
-  uint unused0;
+  float moved_frac;          // cached: EntityStand::moved_frac of an entity
 };
 
 // Three texels of the material table.

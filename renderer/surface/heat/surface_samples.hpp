@@ -43,6 +43,10 @@ struct SurfaceSample {
   /// Share f_i of the full sphere that shows sky. Only the model emit2014 uses it; with other
   /// models it keeps its default.
   float sphere_sky_frac = 0.5F;
+  /// Cosine-weighted share of the hemisphere that the own hull leaves open, and the part of the sky
+  /// in it that depends on the zenith (sky_past_hull()). Static samples keep the defaults.
+  float hull_open_frac = 1.0F;
+  glm::vec3 hull_tilt_frac{0.0F};
   std::uint32_t first_seen = 0;  ///< rest of the hemisphere: entries of SurfaceSamples::seen
   std::uint32_t seen_count = 0;
   /// Factor on the weights of those entries. Samples with a similar view share the entries and

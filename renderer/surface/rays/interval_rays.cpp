@@ -16,6 +16,10 @@
 namespace emit::renderer {
 namespace {
 
+/// Every so many instants of rays, stratified over the interval, one counts for the mean stand.
+constexpr std::size_t kStandStrata = 8;
+constexpr float kStandShare = static_cast<float>(kStandStrata) / kSunRays;
+static_assert(kSunRays % kStandStrata == 0);
 constexpr double kGolden = 0.6180339887498949;
 /// Distance, in radii of an entity, from which on it hides too little sky to matter (1/400).
 constexpr float kNearRadii = 10.0F;
@@ -100,16 +104,23 @@ void IntervalRays::aim(std::size_t ray, std::uint32_t turn, const glm::dvec3& to
                            static_cast<float>(deviates[(place * 45 + 5 + turn * 9) % kSunRays]));
 }
 
+void IntervalRays::anchor(std::vector<EntityAnchor> anchors) {
+  EMIT_CHECK(anchors.empty() || anchors.size() == entity_radius_m_.size());
+  anchors_ = std::move(anchors);
+}
+
 void IntervalRays::update(std::int64_t begin_ns, std::int64_t end_ns, std::uint32_t turn,
                           const Environment& environment, const EntityPoses& poses,
                           const glm::dvec3& origin_world_m) noexcept {
   const std::size_t entities = entity_radius_m_.size();
   any_entity_on_ = false;
   sun_up_ = false;
+  std::ranges::fill(stands_, EntityStand{glm::vec3(0.0F), 0.0F});
   for (std::size_t i = 0; i < kSunRays; ++i) {
     // Permute the strata of time by an odd multiplier.
     const std::size_t stratum = (place_in_disc(i) * 27 + turn * 5) % kSunRays;
     if (stratum == kSunRays / 2) middle_ray_ = i;
+    const bool stands = !anchors_.empty() && stratum % kStandStrata == kStandStrata / 2;
     const double t = (static_cast<double>(stratum) + 0.5) / kSunRays;
     const auto at_ns = begin_ns + std::llround(t * static_cast<double>(end_ns - begin_ns));
     const physics::SunPosition sun = environment.sun_at(at_ns);
@@ -118,7 +129,9 @@ void IntervalRays::update(std::int64_t begin_ns, std::int64_t end_ns, std::uint3
     // Place every entity at the instant of the ray.
     for (std::size_t m = 0; m < entities; ++m) {
       EntityPlacement& place = placements_[m * kSunRays + i];
-      place = placement_of(poses.at(m, at_ns), origin_world_m);
+      const TrajectoryState state = poses.at(m, at_ns);
+      place = placement_of(state, origin_world_m);
+      if (stands) stands_[m].add(stand_of(state.pose, anchors_[m]), kStandShare);
       any_entity_on_ = any_entity_on_ || place.on;
     }
   }

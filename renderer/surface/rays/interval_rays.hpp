@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "history/entity_stand.hpp"
 #include "history/environment.hpp"
 #include "history/pose_history.hpp"
 #include "surface/heat/surface_samples.hpp"
@@ -48,6 +49,7 @@ class IntervalRays {
   explicit IntervalRays(std::vector<float> entity_radius_m, SkyMeasure sky = SkyMeasure::cosine)
       : entity_radius_m_(std::move(entity_radius_m)),
         sky_(sky),
+        stands_(entity_radius_m_.size()),
         placements_(entity_radius_m_.size() * kSunRays),
         reaches_(entity_radius_m_.size() * kSunRays / kPacketRays) {}
 
@@ -56,6 +58,11 @@ class IntervalRays {
   void update(std::int64_t begin_ns, std::int64_t end_ns, std::uint32_t turn,
               const Environment& environment, const EntityPoses& poses,
               const glm::dvec3& origin_world_m) noexcept;
+
+  /// Sets the poses of the entities for which the views of the samples were found. Before that,
+  /// and with an empty list, all stands are those of the anchor. It allocates.
+  /// @pre `anchors` is empty or has an entry for every entity
+  void anchor(std::vector<EntityAnchor> anchors);
 
   /// Switches to intervals of about a second. An entity that no ray of the first packet meets then
   /// passes too fast to matter, and the other packets are not sent for its sake.
@@ -107,6 +114,10 @@ class IntervalRays {
   /// Returns the placement of an entity in the middle of the interval.
   [[nodiscard]] const EntityPlacement& placement(std::size_t entity) const noexcept {
     return placed(entity, middle_ray_);
+  }
+  /// Returns the mean stand of an entity over the interval.
+  [[nodiscard]] const EntityStand& stand(std::size_t entity) const noexcept {
+    return stands_[entity];
   }
   /// Returns the outward normal of a sample in the middle of the interval, in world axes.
   [[nodiscard]] glm::vec3 normal(const SurfaceSample& sample) const noexcept;
@@ -164,6 +175,8 @@ class IntervalRays {
 
   std::vector<float> entity_radius_m_;
   SkyMeasure sky_ = SkyMeasure::cosine;
+  std::vector<EntityAnchor> anchors_;        ///< by entity, or empty
+  std::vector<EntityStand> stands_;          ///< by entity
   std::vector<EntityPlacement> placements_;  ///< by entity, then ray
   std::vector<Reach> reaches_;               ///< by packet, then entity
   std::array<glm::vec3, kSunRays> direction_{};

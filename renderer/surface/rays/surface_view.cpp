@@ -288,6 +288,32 @@ ViewShares ViewSampler::shares(const CasterRays& casters, const ViewPoint& point
           weight_frac * to_sky};
 }
 
+ViewOpening ViewSampler::opening(const CasterRays& casters, const ViewPoint& point,
+                                 const CasterSelection& selection) const noexcept {
+  const Tangents tangents = tangents_of(point.normal);
+  // A hemisphere that is open has a vector mean of 2/3 of its normal, and that turns the share of
+  // the sky by 1/2 (Funk and Hecke: 3/4 of the first moment).
+  constexpr float kTiltOfMoment = 0.75F;
+  if (nothing_near(casters, point, selection)) return {1.0F, 0.5F * point.normal};
+  const glm::vec3 start_m = point.position_m + point.offset_m * (point.normal + point.inward);
+  std::uint32_t open = 0;
+  glm::vec3 sum(0.0F);
+  for (std::size_t begin = 0; begin < directions_.size(); begin += kPacket) {
+    std::array<CasterRay, kPacket> rays;
+    for (std::size_t i = 0; i < kPacket; ++i) {
+      rays[i] = {start_m, turned(directions_[begin + i], tangents, point.normal)};
+    }
+    const std::uint32_t blocked = casters.blocked(rays, selection);
+    for (std::size_t i = 0; i < kPacket; ++i) {
+      if (((blocked >> i) & 1U) != 0U) continue;
+      ++open;
+      sum += rays[i].direction;
+    }
+  }
+  const float weight_frac = 1.0F / static_cast<float>(directions_.size());
+  return {static_cast<float>(open) * weight_frac, kTiltOfMoment * weight_frac * sum};
+}
+
 SurfaceView ViewSampler::view(const CasterRays& casters, const ViewPoint& point,
                               const CasterSelection& selection) const noexcept {
   EMIT_DCHECK_OP(directions_.size(), <=, kMaxRays);

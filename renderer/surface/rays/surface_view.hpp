@@ -59,6 +59,15 @@ struct ViewShares {
   glm::vec3 to_sky{0.0F};
 };
 
+/// Opening of a hemisphere to all sides, whichever of them is up. For the unit vector `up` the
+/// share that shows sky is open_frac / 2 + dot(tilt_frac, up), to the second order of spherical
+/// harmonics: the share for `up` and that for `-up` sum up to open_frac, so that even orders but
+/// the zeroth vanish. It is exact for an open hemisphere.
+struct ViewOpening {
+  float open_frac = 0.0F;
+  glm::vec3 tilt_frac{0.0F};
+};
+
 /// Cosine-weighted view of a point in a fixed set of directions around its normal. They are an
 /// equal-area spiral on the unit disc, lifted to the hemisphere (Malley's method), so that every
 /// ray has the same weight. View factors have an error of about 1/rays^0.75. Immutable; any thread;
@@ -74,6 +83,10 @@ class ViewSampler {
   /// them. If a quarter of the rays hit nothing, as on open ground, the others are not traced.
   [[nodiscard]] ViewShares shares(const CasterRays& casters, const ViewPoint& point,
                                   const CasterSelection& selection) const noexcept;
+
+  /// Returns the opening that what is selected leaves.
+  [[nodiscard]] ViewOpening opening(const CasterRays& casters, const ViewPoint& point,
+                                    const CasterSelection& selection) const noexcept;
 
   /// Returns the view with the faces that are seen. If there are more than kMaxSeen hits,
   /// neighbours in direction are joined, first those of one instance and similar orientation; the

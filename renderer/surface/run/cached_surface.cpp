@@ -166,8 +166,14 @@ void CachedSurface::begin_first_interval(std::int64_t start_ns, const Inputs& in
   weather_change_ns_ = kNoChange;
   renewing_ = false;
   lags_ = false;
+  // Note where the entities stand: views of their samples hold for there.
+  const std::vector<float> radii_m = geometry_.entity_radii_m();
+  anchors_.clear();
+  for (std::size_t m = 0; m < inputs.entities.size(); ++m) {
+    anchors_.push_back({inputs.entities[m].at(start_ns).pose, radii_m[m]});
+  }
   // Let all blocks follow the intervals.
-  interval_.reset(*model_, model_options().exchange,
+  interval_.reset(*model_, anchors_, model_options().exchange,
                   static_cast<std::uint32_t>(plan.intervals().size()));
   local_ =
       LocalSteps(model_->samples,

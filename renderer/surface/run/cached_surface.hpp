@@ -10,6 +10,7 @@
 
 #include "emit/physics/check.hpp"
 #include "emit/scene/scene_desc.hpp"
+#include "history/entity_stand.hpp"
 #include "history/environment.hpp"
 #include "history/step_plan.hpp"
 #include "history/surface_history.hpp"
@@ -111,6 +112,10 @@ class CachedSurface {
     return local_->active();
   }
 
+  /// Poses of the entities for which the views of their samples were found, by entity.
+  /// @pre prepare()
+  [[nodiscard]] const std::vector<EntityAnchor>& anchors() const noexcept { return anchors_; }
+
   /// Exposure tiles: recent shade of entities, finer than samples lie. @pre prepare()
   [[nodiscard]] const ExposureTiles& exposure_tiles() const noexcept {
     EMIT_CHECK(exposure_tiles_.has_value());
@@ -210,6 +215,7 @@ class CachedSurface {
   SurfaceNodes nodes_;
   SurfaceInterval interval_;
   FrameShares shares_;  ///< time in which the samples of `interval_` are computed
+  std::vector<EntityAnchor> anchors_;
   std::optional<LocalSteps> local_;
   EntityShadows entity_shadows_;
   std::optional<ExposureTiles> exposure_tiles_;

@@ -39,7 +39,7 @@ std::vector<DrawnMesh> make_drawn_meshes(const scene::SceneGeometry& geometry,
 
 SampledScene take_sampled_scene(const scene::SceneGeometry& geometry, SurfaceModel& model) {
   EMIT_CHECK_OP(model.drawn.size(), ==, geometry.meshes.size());
-  SampledScene scene{geometry, {}, {}, {}};
+  SampledScene scene{geometry, {}, {}, {}, {}};
   scene::SceneGeometry& out = scene.geometry;
   // Group the instances by mesh.
   std::vector<std::uint32_t> order(out.instances.size());
@@ -58,6 +58,12 @@ SampledScene take_sampled_scene(const scene::SceneGeometry& geometry, SurfaceMod
   model.drawn.clear();
   for (std::uint32_t i = 0; i < model.drawn_samples; ++i) {
     scene.sky_frac.push_back(model.samples.samples[i].sky_frac);
+  }
+  const auto of_entity = [](const SurfaceSample& sample) { return sample.entity >= 0; };
+  if (std::ranges::none_of(model.samples.samples, of_entity)) return scene;
+  for (std::uint32_t i = 0; i < model.drawn_samples; ++i) {
+    const SurfaceSample& sample = model.samples.samples[i];
+    scene.hull.emplace_back(0.5F * sample.hull_open_frac, sample.hull_tilt_frac);
   }
   return scene;
 }

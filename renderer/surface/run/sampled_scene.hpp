@@ -20,6 +20,9 @@ struct SampledScene {
   std::vector<ClusterLevels> levels;        ///< levels of detail by mesh
   std::vector<std::uint32_t> first_sample;  ///< by instance: sample of its mesh's first vertex
   std::vector<float> sky_frac;              ///< by sample: share of the hemisphere that shows sky
+  /// Half of SurfaceSample::hull_open_frac, then hull_tilt_frac, by sample. It is empty without
+  /// entities.
+  std::vector<glm::vec4> hull;
 };
 
 /// Makes the levels of detail of the refined meshes of a model of `geometry`, for the values of the

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "emit/physics/check.hpp"
 
@@ -27,8 +28,10 @@ SurfaceInterval::SurfaceInterval(const SurfaceGeometry& geometry, const SampleHe
       rays_(geometry.entity_radii_m(), heat.sky_measure()),
       interval_(heat.sized_interval()) {}
 
-void SurfaceInterval::reset(const SurfaceModel& model, bool exchange, std::uint32_t turn) {
+void SurfaceInterval::reset(const SurfaceModel& model, std::vector<EntityAnchor> anchors,
+                            bool exchange, std::uint32_t turn) {
   turn_ = turn;
+  rays_.anchor(std::move(anchors));
   done_ = 0;
   exitance_ = {};
   faces_.clear();

@@ -41,9 +41,11 @@ class SurfaceInterval {
   /// Keeps references to both, which must outlive it.
   SurfaceInterval(const SurfaceGeometry& geometry, const SampleHeat& heat);
 
-  /// Starts with a new model. `exchange` says that faces exchange radiation. `turn` is the number
+  /// Starts with a new model. `anchors` has the poses of the entities for which the views of its
+  /// samples were found. `exchange` says that faces exchange radiation. `turn` is the number
   /// of intervals before: each has another pattern of sun rays. It allocates.
-  void reset(const SurfaceModel& model, bool exchange, std::uint32_t turn);
+  void reset(const SurfaceModel& model, std::vector<EntityAnchor> anchors, bool exchange,
+             std::uint32_t turn);
 
   /// Fills forcing, gains and rays for the interval between two nodes, with the poses and the
   /// weather that are known now. Nothing of `to` is computed yet. It advances the surroundings in

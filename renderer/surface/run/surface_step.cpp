@@ -2,16 +2,50 @@
 #include "surface/run/surface_step.hpp"
 
 #include <cstddef>
+#include <optional>
 
 #include "emit/physics/check.hpp"
+#include "surface/heat/view_of_now.hpp"
 
 namespace emit::renderer {
 namespace {
 
+/// Sample with the view that it has in an interval. Only the samples of entities that have moved
+/// since the warm-up are copied for it.
+class ViewedSample {
+ public:
+  ViewedSample(const SurfaceStep& step, const IntervalRays& interval_rays,
+               const SurfaceSample& sample) noexcept
+      : sample_(&sample) {
+    const EntityStand stand = sample.entity >= 0
+                                  ? interval_rays.stand(static_cast<std::size_t>(sample.entity))
+                                  : EntityStand{};
+    view_ = view_of_now(step.all, sample, stand);
+    if (stand.moved_frac == 0.0F) return;
+    moved_ = sample;
+    moved_->sky_frac = view_.sky_frac;
+    moved_->far_frac = view_.far_frac;
+    moved_->sphere_sky_frac = view_.sphere_sky_frac;
+    sample_ = &*moved_;
+  }
+  ViewedSample(const ViewedSample&) = delete;
+  ViewedSample& operator=(const ViewedSample&) = delete;
+
+  [[nodiscard]] const SurfaceSample& sample() const noexcept { return *sample_; }
+  [[nodiscard]] const ViewOfNow& view() const noexcept { return view_; }
+
+ private:
+  const SurfaceSample* sample_;
+  ViewOfNow view_;
+  std::optional<SurfaceSample> moved_;
+};
+
 /// Input of a sample over an interval. Other samples count with their output at its begin.
 SampleDrive drive_of(const SurfaceStep& step, const IntervalRays& interval_rays,
-                     std::span<const SampleOutput> begin, const SurfaceSample& sample,
+                     std::span<const SampleOutput> begin, const ViewedSample& viewed,
                      const RayOffsets& offsets, const SunShare& sun) noexcept {
+  const SurfaceSample& sample = viewed.sample();
+  const ViewOfNow& view = viewed.view();
   SampleDrive drive;
   drive.sun_frac = sun.frac;
   // Replace the sky behind entities by the long-wave radiation of the one that hides most.
@@ -25,16 +59,24 @@ SampleDrive drive_of(const SurfaceStep& step, const IntervalRays& interval_rays,
     }
   }
   // Add the radiation of the samples that it sees.
-  double longwave_w_m2 = 0.0;
-  double shortwave_w_m2 = 0.0;
+  struct Radiation {
+    double longwave_w_m2 = 0.0;
+    double shortwave_w_m2 = 0.0;
+  };
+  Radiation own;
+  Radiation others;
+  const bool apart = view.own_scale != view.others_scale;
   for (std::uint32_t k = 0; k < sample.seen_count; ++k) {
     const SeenSample& seen = step.all.seen[sample.first_seen + k];
     const SampleOutput& other = begin[seen.sample];
-    longwave_w_m2 += seen.weight_frac * other.longwave_out_w_m2;
-    shortwave_w_m2 += seen.weight_frac * other.shortwave_out_w_m2;
+    Radiation& sum = apart && step.all.samples[seen.sample].entity == sample.entity ? own : others;
+    sum.longwave_w_m2 += seen.weight_frac * other.longwave_out_w_m2;
+    sum.shortwave_w_m2 += seen.weight_frac * other.shortwave_out_w_m2;
   }
-  drive.longwave_begin_w_m2 += sample.seen_scale * longwave_w_m2;
-  drive.shortwave_w_m2 = sample.seen_scale * shortwave_w_m2;
+  drive.longwave_begin_w_m2 +=
+      view.others_scale * others.longwave_w_m2 + view.own_scale * own.longwave_w_m2;
+  drive.shortwave_w_m2 =
+      view.others_scale * others.shortwave_w_m2 + view.own_scale * own.shortwave_w_m2;
   // Let the start of the interval stand for all of it: neighbours change by hundredths of a kelvin.
   drive.longwave_end_w_m2 = drive.longwave_begin_w_m2;
   for (std::size_t p = 0; p < kMaxPartners; ++p) {
@@ -52,7 +94,8 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
                  const HeatInterval& interval, std::span<const SampleOutput> begin,
                  std::uint32_t index, SteppedSample& stepped) noexcept {
   EMIT_DCHECK(steps_itself(step.all, index));
-  const SurfaceSample& sample = step.all.samples[index];
+  const ViewedSample viewed(step, interval_rays, step.all.samples[index]);
+  const SurfaceSample& sample = viewed.sample();
   // Take ray offsets for the place of the sample, of an entity for where it stands now.
   RayOffsets offsets = step.offsets;
   if (sample.entity < 0) {
@@ -66,7 +109,7 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
     return interval_rays.sun_share(step.rays, side, offsets.sun_m, 0.0F);
   };
   const SunShare sun = sun_of(sample);
-  const SampleDrive drive = drive_of(step, interval_rays, begin, sample, offsets, sun);
+  const SampleDrive drive = drive_of(step, interval_rays, begin, viewed, offsets, sun);
   const glm::vec3 normal = interval_rays.normal(sample);
   if (sample.other_side == kNoSample) {
     stepped.output = step.heat.advance(sample, normal, interval, drive, stepped.state);
@@ -75,9 +118,11 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
     return;
   }
   // Advance a sheet by the mean of what both faces receive.
-  const SurfaceSample& behind = step.all.samples[sample.other_side];
+  const ViewedSample viewed_behind(step, interval_rays, step.all.samples[sample.other_side]);
+  const SurfaceSample& behind = viewed_behind.sample();
   const SunShare sun_behind = sun_of(behind);
-  const SampleDrive back_drive = drive_of(step, interval_rays, begin, behind, offsets, sun_behind);
+  const SampleDrive back_drive =
+      drive_of(step, interval_rays, begin, viewed_behind, offsets, sun_behind);
   const SheetBack back{behind, back_drive};
   stepped.output = step.heat.advance(sample, normal, interval, drive, stepped.state, &back);
   stepped.behind =

@@ -101,6 +101,8 @@ bool PatchSampler::inherit_view(SurfacePatch& patch, std::uint32_t index,
   sample.sky_frac = mean(low.sky_frac, high.sky_frac);
   sample.far_frac = mean(low.far_frac, high.far_frac);
   sample.sphere_sky_frac = mean(low.sphere_sky_frac, high.sphere_sky_frac);
+  sample.hull_open_frac = mean(low.hull_open_frac, high.hull_open_frac);
+  sample.hull_tilt_frac = 0.5F * (low.hull_tilt_frac + high.hull_tilt_frac);
   for (std::size_t i = 0; i < sample.open_frac.size(); ++i) {
     sample.open_frac[i] = mean(low.open_frac[i], high.open_frac[i]);
     sample.open_before_frac[i] = mean(low.open_before_frac[i], high.open_before_frac[i]);
@@ -149,6 +151,17 @@ void PatchSampler::look_around(SurfacePatch& patch, std::uint32_t index,
       each->inward = own.rel_from_body * each->inward;
     }
     selection.entities = placed;
+  }
+  // Find what the own hull leaves open, for other attitudes (view_of_now()).
+  if (sample.entity >= 0) {
+    std::vector<EntityPlacement> own_alone = placed;
+    for (EntityPlacement& place : own_alone) place.on = false;
+    own_alone[static_cast<std::size_t>(sample.entity)].on = true;
+    const ViewOpening hull = sky_.opening(in_.rays, point, {false, own_alone});
+    sample.hull_open_frac = hull.open_frac;
+    sample.hull_tilt_frac =
+        glm::transpose(placed[static_cast<std::size_t>(sample.entity)].rel_from_body) *
+        hull.tilt_frac;
   }
   // Find the open shares.
   const ViewShares open = sky_.shares(in_.rays, point, selection);

@@ -45,6 +45,7 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   EXPECT_OFFSET(*geometry, "draw", gpu::DrawParams, normal_from_mesh[0]);
   EXPECT_OFFSET(*geometry, "draw", gpu::DrawParams, material);
   EXPECT_OFFSET(*geometry, "draw", gpu::DrawParams, moves);
+  EXPECT_OFFSET(*geometry, "draw", gpu::DrawParams, moved_frac);
   EXPECT_OFFSET(*geometry, "frame", gpu::FrameParams, node_frac);
   EXPECT_OFFSET(*geometry, "frame", gpu::FrameParams, reference_k);
   EXPECT_OFFSET(*geometry, "frame", gpu::FrameParams, to_sun);

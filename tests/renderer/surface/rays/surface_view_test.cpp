@@ -101,6 +101,44 @@ TEST(SurfaceView, shares_tell_what_a_turn_of_the_face_changes) {
   }
 }
 
+TEST(SurfaceView, the_opening_of_a_free_face_gives_the_sky_of_every_attitude) {
+  SurfaceScene scene;
+  scene.add_static(test::level_mesh(glm::vec3(-1.0F), glm::vec3(1.0F), 0.0F));
+  const CasterRays casters = rays_of(scene);
+  const ViewOpening opening = ViewSampler(1024).opening(
+      casters,
+      {.position_m = {0.0F, 0.0F, 500.0F}, .normal = glm::normalize(glm::vec3(1.0F, 2.0F, 2.0F))},
+      {});
+  EXPECT_EQ(opening.open_frac, 1.0F);
+  // Compare with the view factor of a tilted plane, (1 + cos tilt) / 2.
+  for (const glm::vec3& up :
+       {kUp, -kUp, glm::vec3(1.0F, 0.0F, 0.0F), glm::vec3(0.6F, 0.0F, 0.8F)}) {
+    const float cosine = glm::dot(up, glm::normalize(glm::vec3(1.0F, 2.0F, 2.0F)));
+    EXPECT_NEAR(0.5F * opening.open_frac + glm::dot(opening.tilt_frac, up), 0.5F * (1.0F + cosine),
+                1e-6F);
+  }
+}
+
+TEST(SurfaceView, the_opening_at_the_foot_of_a_wall_gives_the_sky_to_a_tenth) {
+  SurfaceScene scene;
+  scene.add_static(ground());
+  scene.add_static(test::box_mesh(glm::vec3(0.0F, -5e3F, 0.0F), glm::vec3(1.0F, 5e3F, 5e3F)));
+  const CasterRays casters = rays_of(scene);
+  ViewPoint foot{.inward = {-1.0F, 0.0F, 0.0F}, .offset_m = 2e-3F};
+  foot.position_m -= glm::vec3(casters.origin_world_m());
+  const ViewOpening opening = ViewSampler(1024).opening(casters, foot, {});
+  EXPECT_NEAR(opening.open_frac, 0.5F, 0.01F);
+  const auto sky_frac = [&](const glm::vec3& up) {
+    return 0.5F * opening.open_frac + glm::dot(opening.tilt_frac, up);
+  };
+  // Upright, all that is open is sky. With the wall below it is too, but the second order
+  // gives only 1/4 + 1/(2 pi).
+  EXPECT_NEAR(sky_frac(kUp), 0.5F, 0.01F);
+  EXPECT_NEAR(sky_frac(-kUp), 0.0F, 0.01F);
+  EXPECT_NEAR(sky_frac({-1.0F, 0.0F, 0.0F}), 0.5F, 0.1F);
+  EXPECT_NEAR(sky_frac({0.0F, 1.0F, 0.0F}), 0.25F, 0.01F);
+}
+
 TEST(SurfaceView, open_ground_sees_the_sky_alone) {
   SurfaceScene scene;
   scene.add_static(ground());

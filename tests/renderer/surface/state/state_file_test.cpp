@@ -57,6 +57,8 @@ struct World {
       sample.sky_frac = number();
       sample.sphere_sky_frac = number();
       sample.far_frac = number();
+      sample.hull_open_frac = number();
+      sample.hull_tilt_frac = {number(), number(), number()};
       sample.first_seen = i;
       sample.seen_count = 1;
       sample.seen_scale = number();
@@ -167,6 +169,8 @@ TEST_F(StateFile, gives_back_what_was_written_and_leaves_nothing_beside_it) {
     EXPECT_EQ(a.sky_frac, b.sky_frac);
     EXPECT_EQ(a.sphere_sky_frac, b.sphere_sky_frac);
     EXPECT_EQ(a.far_frac, b.far_frac);
+    EXPECT_EQ(a.hull_open_frac, b.hull_open_frac);
+    EXPECT_EQ(a.hull_tilt_frac, b.hull_tilt_frac);
     EXPECT_EQ(a.first_seen, b.first_seen);
     EXPECT_EQ(a.seen_count, b.seen_count);
     EXPECT_EQ(a.seen_scale, b.seen_scale);
