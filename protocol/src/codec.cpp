@@ -136,6 +136,8 @@ std::string_view to_string(DecodeStatus status) noexcept {
       return "invalid pose";
     case DecodeStatus::invalid_environment:
       return "invalid environment";
+    case DecodeStatus::invalid_view:
+      return "invalid view";
   }
   return "unknown";
 }

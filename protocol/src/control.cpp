@@ -69,6 +69,8 @@ std::string status_text(StatusCode code, std::uint64_t detail) {
       return "failure inside emitd";
     case StatusCode::invalid_environment:
       return "environment outside its ranges";
+    case StatusCode::invalid_view:
+      return "field of view outside sensor.fov_h_min_deg to sensor.fov_h_deg, or fixed by optics";
   }
   return "unknown status";
 }

@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "emit/physics/constants.hpp"
 #include "emit/physics/limits.hpp"
 #include "emit/v1/control.pb.h"
 #include "emit/v1/host.pb.h"
@@ -22,6 +23,7 @@ static_assert(static_cast<int>(DecodeStatus::malformed) == v1::Status::CODE_MALF
 static_assert(static_cast<int>(DecodeStatus::invalid_pose) == v1::Status::CODE_INVALID_POSE);
 static_assert(static_cast<int>(DecodeStatus::invalid_environment) ==
               v1::Status::CODE_INVALID_ENVIRONMENT);
+static_assert(static_cast<int>(DecodeStatus::invalid_view) == v1::Status::CODE_INVALID_VIEW);
 
 namespace limits = physics::limits;
 
@@ -151,6 +153,12 @@ void to_proto(const HostFrameData& frame, v1::HostFrame& out) {
   to_proto(frame.seeker, frame.seeker_rates, *out.mutable_seeker());
   for (const EntityStateData& entity : frame.entity_span()) to_proto(entity, *out.add_entities());
   if (frame.environment) to_proto(*frame.environment, *out.mutable_environment());
+  if (frame.fov_h_rad) out.set_fov_h_rad(*frame.fov_h_rad);
+  if (frame.gimbal_rad) {
+    out.mutable_gimbal()->set_yaw_rad(frame.gimbal_rad->x);
+    out.mutable_gimbal()->set_pitch_rad(frame.gimbal_rad->y);
+    out.mutable_gimbal()->set_roll_rad(frame.gimbal_rad->z);
+  }
 }
 
 DecodeStatus check_pose(const physics::Pose& pose, const std::optional<PoseRates>& rates,
@@ -247,6 +255,8 @@ DecodeStatus from_proto(const v1::HostFrame& in, HostFrameData& out, DecodeFault
   out.received_ns = 0;
   out.entity_count = 0;
   out.environment.reset();
+  out.fov_h_rad.reset();
+  out.gimbal_rad.reset();
   if (in.protocol_version() != kProtocolVersion) return DecodeStatus::wrong_version;
   if (static_cast<std::size_t>(in.entities_size()) > kMaxEntitiesPerFrame) {
     return DecodeStatus::oversize;
@@ -275,6 +285,22 @@ DecodeStatus from_proto(const v1::HostFrame& in, HostFrameData& out, DecodeFault
       return DecodeStatus::malformed;
     }
     ++out.entity_count;
+  }
+  if (in.has_gimbal()) {
+    const v1::Gimbal& gimbal = in.gimbal();
+    out.gimbal_rad = glm::dvec3(gimbal.yaw_rad(), gimbal.pitch_rad(), gimbal.roll_rad());
+    if (!check.in_range({"gimbal.yaw_rad", "gimbal.pitch_rad", "gimbal.roll_rad"}, *out.gimbal_rad,
+                        physics::kPi)) {
+      set_part(fault, DecodeFault::Part::seeker);
+      return DecodeStatus::invalid_pose;
+    }
+  }
+  if (in.has_fov_h_rad()) {
+    out.fov_h_rad = in.fov_h_rad();
+    // The scenario's own range, which is narrower, is checked where the frame is used.
+    constexpr limits::Interval kFovRad{limits::kFieldOfViewDeg.lo * physics::kDegree,
+                                       limits::kFieldOfViewDeg.hi * physics::kDegree};
+    if (!check.in_range("fov_h_rad", *out.fov_h_rad, kFovRad)) return DecodeStatus::invalid_view;
   }
   if (in.has_environment()) {
     return from_proto(in.environment(), out.environment.emplace(), fault);

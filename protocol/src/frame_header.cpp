@@ -15,8 +15,7 @@ namespace {
 using physics::ErrorCode;
 using physics::make_error;
 
-// Offsets of the fields (docs/wire.md section 3). The bytes behind kReservedAt and
-// kReservedMotionAt are zero.
+// Offsets of the fields (docs/wire.md section 3). Reserved bytes are zero.
 enum Offset : std::size_t {
   kMagicAt = 0,
   kVersionAt = 4,
@@ -75,7 +74,9 @@ enum Offset : std::size_t {
   kPointingErrorAt = 300,
   kDisplayAt = 304,
   kAppliedShiftYAt = 312,
-  kCrcAt = 316,
+  kFovAt = 316,
+  kReservedGrowthAt = 320,
+  kCrcAt = 380,
 };
 static_assert(kCrcAt + 4 == kFrameHeaderBytes);
 
@@ -197,6 +198,8 @@ void encode(const FrameHeader& header, std::span<std::byte, kFrameHeaderBytes> o
   wire::put(to, kPointingErrorAt, header.pointing_error_px);
   wire::put(to, kDisplayAt, header.display_ns);
   wire::put(to, kAppliedShiftYAt, header.applied_shift_y_px);
+  wire::put(to, kFovAt, header.fov_h_rad);
+  std::ranges::fill(to.subspan(kReservedGrowthAt, kCrcAt - kReservedGrowthAt), std::byte{0});
   wire::put(to, kCrcAt, crc32c(to.first(kCrcAt)));
 }
 
@@ -281,6 +284,7 @@ HeaderFault parse_frame_header(std::span<const std::byte> bytes, FrameHeader& he
   header.output_steps = wire::get<std::uint8_t>(bytes, kOutputStepsAt);
   header.applied_shift_x_px = wire::get<float>(bytes, kAppliedShiftXAt);
   header.applied_shift_y_px = wire::get<float>(bytes, kAppliedShiftYAt);
+  header.fov_h_rad = wire::get<float>(bytes, kFovAt);
 
   const std::uint64_t expected = expected_payload_bytes(header.width_px, header.height_px);
   if (expected == 0 || header.payload_bytes != expected) return HeaderFault::payload_size;

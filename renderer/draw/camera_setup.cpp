@@ -9,7 +9,7 @@
 
 namespace emit::renderer {
 
-CameraSetup set_camera(const scene::SensorDesc& sensor, const physics::Pose& pose,
+CameraSetup set_camera(const scene::SensorDesc& sensor, double fov_h_rad, const physics::Pose& pose,
                        gpu::FrameParams& params) noexcept {
   EMIT_CHECK_OP(params.rendered_px.x, >=, 1U);
   EMIT_CHECK_OP(params.rendered_px.y, >=, 1U);
@@ -20,7 +20,7 @@ CameraSetup set_camera(const scene::SensorDesc& sensor, const physics::Pose& pos
   const glm::dmat3 sensor_from_world =
       physics::sensor_from_body() * glm::transpose(glm::mat3_cast(pose.world_from_body));
   view.relworld_from_sensor = glm::transpose(sensor_from_world);
-  view.tan_half_h = std::tan(0.5 * sensor.fov_h_rad);
+  view.tan_half_h = std::tan(0.5 * fov_h_rad);
   view.tan_half_v = view.tan_half_h * sensor.height_px / sensor.width_px;
   view.near_m = sensor.near_m;
   camera.pixel_rad = 2.0 * view.tan_half_h / params.rendered_px.x;

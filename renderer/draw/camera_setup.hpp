@@ -15,8 +15,9 @@ struct CameraSetup {
 
 /// Sets up the camera for a sensor at a pose and fills the camera's part of `params`. The scene's
 /// boxes in the result stay at their defaults. RT-safe.
+/// @param fov_h_rad  horizontal field of view, in place of the sensor's
 /// @pre params.rendered_px and the sensor's format are at least 1 x 1 pixel.
-[[nodiscard]] CameraSetup set_camera(const scene::SensorDesc& sensor, const physics::Pose& pose,
-                                     gpu::FrameParams& params) noexcept;
+[[nodiscard]] CameraSetup set_camera(const scene::SensorDesc& sensor, double fov_h_rad,
+                                     const physics::Pose& pose, gpu::FrameParams& params) noexcept;
 
 }  // namespace emit::renderer

@@ -18,7 +18,7 @@ namespace emit::renderer {
 /// constructor is setup only; all other functions are RT-safe, and wait() blocks.
 class ReadbackRing {
  public:
-  static constexpr std::uint32_t kMaxSlots = 16;
+  static constexpr std::uint32_t kMaxSlots = 32;
 
   /// Ring of `slots` slots of `bytes_per_slot` bytes. mapped() says whether the driver gave the
   /// memory.

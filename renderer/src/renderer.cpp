@@ -66,6 +66,10 @@ Result<void> check_limits(const scene::ScenarioDesc& scenario, const OutputOptio
     return fail(fmt::format("sensor field of view of {} degrees: above 0 to {} are possible",
                             fov_h_deg, limits::kFieldOfViewDeg.hi));
   }
+  if (scenario.sensor.narrowest_fov_rad() > scenario.sensor.fov_h_rad) {
+    return fail(fmt::format("sensor.fov_h_min_deg is {}, wider than sensor.fov_h_deg ({})",
+                            scenario.sensor.fov_h_min_rad / physics::kDegree, fov_h_deg));
+  }
   const auto check = [&fail](std::string_view what, std::uint32_t value,
                              const limits::Count& count) -> Result<void> {
     if (count.contains(value)) return {};
@@ -140,6 +144,15 @@ class GlRenderer final : public Renderer {
     return ready;
   }
   [[nodiscard]] glm::uvec2 output_px() const noexcept { return frame_params_.output_px; }
+  [[nodiscard]] double fov_of(const FrameRequest& request) const noexcept {
+    return request.fov_h_rad > 0.0 ? request.fov_h_rad : scenario_.sensor.fov_h_rad;
+  }
+  /// Returns true for a field of view that the surface was not prepared for.
+  [[nodiscard]] bool is_beyond_sensor(double fov_h_rad) const noexcept {
+    constexpr double kSlackFrac = 1e-6;  // hosts round
+    return fov_h_rad < (1.0 - kSlackFrac) * scenario_.sensor.narrowest_fov_rad() ||
+           fov_h_rad > (1.0 + kSlackFrac) * scenario_.sensor.fov_h_rad;
+  }
   /// Sets up the camera of a frame and starts its draw lists with all instances at its instant.
   [[nodiscard]] CameraSetup place_camera(const FrameRequest& request,
                                          const QualityLevel& level) noexcept;
@@ -338,7 +351,8 @@ CameraSetup GlRenderer::place_camera(const FrameRequest& request,
   // Place the instances and the camera.
   DrawLists& lists = stage_->drawn().lists;
   lists.begin(request.sensor_pose.position_world_m, request.sim_time_ns, history_.entities);
-  CameraSetup camera = set_camera(scenario_.sensor, request.sensor_pose, frame_params_);
+  CameraSetup camera =
+      set_camera(scenario_.sensor, fov_of(request), request.sensor_pose, frame_params_);
   if (!stage_->looks_around() && window_size_px(window_px) != output_px()) {
     // Draw one pixel more on every side, because a triangle may touch the outermost pixels of the
     // window.
@@ -410,7 +424,7 @@ std::span<const QualityLevelStats> GlRenderer::expected_levels(
     const FrameRequest& request) noexcept {
   static constexpr std::array<QualityLevelStats, 1> kFullOnly{};
   if (ladder_.empty()) return kFullOnly;
-  const bool known = ladder_.at(request.sensor_pose, scenario_.sensor.fov_h_rad, expected_levels_);
+  const bool known = ladder_.at(request.sensor_pose, fov_of(request), expected_levels_);
   // Estimate the times from triangles and pixels where nothing was measured. The measured frames
   // are whole images.
   const glm::uvec2 window_px = window_size_px(window_of(request.window_px, output_px()));
@@ -446,6 +460,7 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
   view.frame_number = request.frame_number;
   view.sim_time_ns = request.sim_time_ns;
   view.sensor_pose = request.sensor_pose;
+  view.fov_h_rad = fov_of(request);
   view.stats.dropped_poses = 0;
   for (const PoseHistory& history : history_.entities) {
     view.stats.dropped_poses += history.dropped();
@@ -476,7 +491,7 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
   view.quality_level =
       passes_.enlarge ? std::min<std::uint8_t>(request.quality_level, kQualityLadder.size() - 1)
                       : 0;
-  const bool known = ladder_.at(request.sensor_pose, scenario_.sensor.fov_h_rad, expected_levels_);
+  const bool known = ladder_.at(request.sensor_pose, fov_of(request), expected_levels_);
   view.estimated_error_k = view.quality_level == 0 ? 0.0F
                            : known
                                ? static_cast<float>(expected_levels_[view.quality_level].error_k)
@@ -484,7 +499,8 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
   const QualityLevel& level = kQualityLadder[view.quality_level];
   // Do the work of the CPU and bind everything.
   prepare(request, level);
-  view.stats.coarse = stage_->coarse_from(request.sensor_pose) || view.stats.rewarm_s > 0.0;
+  view.stats.coarse = stage_->coarse_from(request.sensor_pose) || view.stats.rewarm_s > 0.0 ||
+                      is_beyond_sensor(fov_of(request));
   bind_frame();
   // Clear the counters, then issue all passes and the read-back.
   const std::uint32_t zero = 0;

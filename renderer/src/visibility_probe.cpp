@@ -96,7 +96,7 @@ Result<VisibilityProbe::Answer> GlProbe::at_middle(scene::SceneGeometry geometry
   frame.rendered_px = frame.output_px = size_px;
   frame.rendered_plane_px = frame.output_plane_px = size_px.x * size_px.y;
   frame.rendered_window_px = frame.output_window_px = window_of({}, size_px);
-  CameraSetup camera = set_camera(sensor_, sensor_pose, frame);
+  CameraSetup camera = set_camera(sensor_, sensor_.fov_h_rad, sensor_pose, frame);
   const scene::Aabb& bounds = lists.bounds();
   camera.view.scene_min_m = camera.view.casters_min_m = bounds.min_m;
   camera.view.scene_max_m = camera.view.casters_max_m = bounds.max_m;

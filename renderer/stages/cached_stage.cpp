@@ -27,9 +27,9 @@ constexpr double kFieldMarginFrac = 0.5;
 /// The camera may point anywhere.
 constexpr double kAnyCosine = -2.0;
 
-/// Angle of one pixel at the boresight.
+/// Angle of one pixel at the boresight, with the narrowest field of view.
 double pixel_rad(const scene::SensorDesc& sensor) {
-  return 2.0 * std::tan(0.5 * sensor.fov_h_rad) / sensor.width_px;
+  return 2.0 * std::tan(0.5 * sensor.narrowest_fov_rad()) / sensor.width_px;
 }
 
 /// Angle between the boresight and a corner of the image.

@@ -26,10 +26,13 @@ void add_copies(Picture& picture, const SourceInfo& source) {
   }
 }
 
-/// Returns the focal length of the image of a scenario's sensor, px; 0 without one.
-double focal_px_of(const std::optional<scene::ScenarioDesc>& scenario) {
-  if (!scenario || scenario->sensor.fov_h_rad <= 0.0) return 0.0;
-  return 0.5 * scenario->sensor.width_px / std::tan(0.5 * scenario->sensor.fov_h_rad);
+/// Returns the focal length of a camera's image, px; 0 without a scenario.
+double focal_px_of(const std::optional<scene::ScenarioDesc>& scenario, const Camera& camera) {
+  if (!scenario) return 0.0;
+  const double fov_h_rad =
+      camera.mount.fov_h_rad > 0.0 ? camera.mount.fov_h_rad : scenario->sensor.fov_h_rad;
+  if (fov_h_rad <= 0.0) return 0.0;
+  return 0.5 * scenario->sensor.width_px / std::tan(0.5 * fov_h_rad);
 }
 
 /// Makes the output of an image, where it has one, and its size.
@@ -52,9 +55,29 @@ bool fits(const scene::PixelRect& window, const SourceInfo& source) noexcept {
 
 }  // namespace
 
+std::vector<Camera> cameras_of(const std::optional<scene::ScenarioDesc>& scenario, bool motion) {
+  std::vector<Camera> cameras;
+  const std::size_t count = scenario ? scenario->channels.size() : 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const scene::ChannelDesc& channel = scenario->channels[i];
+    const bool along = motion && channel.kind == scene::ChannelKind::projector;
+    auto found = std::ranges::find_if(cameras, [&](const Camera& camera) {
+      return camera.along_projector == along && camera.mount == channel.camera;
+    });
+    if (found == cameras.end()) {
+      found = cameras.insert(found, Camera{channel.camera, along, 0});
+    }
+    found->channels |= ChannelSet{1} << (i % kMaxChannels);
+  }
+  if (cameras.empty()) cameras.emplace_back();
+  return cameras;
+}
+
 physics::Result<ChannelTable> make_channels(const std::optional<scene::ScenarioDesc>& scenario,
-                                            const SourceInfo& source) {
+                                            const SourceInfo& source, bool motion) {
   ChannelTable table;
+  // Images that are stored already have no camera.
+  table.cameras = source.canned ? std::vector<Camera>(1) : cameras_of(scenario, motion);
   const auto add = [&](const scene::ChannelDesc& wanted, const scene::SpectralBand& band,
                        std::size_t plane) {
     const scene::PixelRect window = wanted.window_px.empty()
@@ -73,12 +96,18 @@ physics::Result<ChannelTable> make_channels(const std::optional<scene::ScenarioD
     channel.sensor_width_px = source.width_px;
     channel.sensor_height_px = source.height_px;
     channel.every_nth = wanted.every_nth;
+    const auto camera = std::ranges::find_if(table.cameras, [&](const Camera& one) {
+      return (one.channels >> (channel.index % kMaxChannels) & 1U) != 0;
+    });
+    channel.camera = static_cast<std::size_t>(camera - table.cameras.begin());
     auto picture =
         std::find_if(table.pictures.begin(), table.pictures.end(), [&](const Picture& other) {
-          return other.plane == plane && other.window_px == window && other.output == wanted.output;
+          return other.camera == channel.camera && other.plane == plane &&
+                 other.window_px == window && other.output == wanted.output;
         });
     if (picture == table.pictures.end()) {
       Picture made;
+      made.camera = channel.camera;
       made.plane = plane;
       made.window_px = window;
       made.output = wanted.output;
@@ -105,10 +134,16 @@ physics::Result<ChannelTable> make_channels(const std::optional<scene::ScenarioD
                                       where, channel.name, source.width_px, source.height_px));
       }
     }
-    const double focal_px = focal_px_of(scenario);
+    if (table.cameras.size() > kMaxCameras) {
+      return make_error(ErrorCode::config,
+                        fmt::format("{}: the channels have {} cameras (fields of view, places and "
+                                    "directions), at most {} can be rendered",
+                                    where, table.cameras.size(), kMaxCameras));
+    }
     for (Channel& channel : table.channels) {
       Picture& picture = table.pictures[channel.picture];
       if (picture.pixels() == 0) {
+        const double focal_px = focal_px_of(scenario, table.cameras[picture.camera]);
         if (auto made = make_output(picture, {source.width_px, source.height_px}, focal_px);
             !made) {
           return tl::unexpected(

@@ -32,10 +32,20 @@ struct Channel {
   std::uint32_t sensor_height_px = 0;
   std::uint32_t every_nth = 1;  ///< shows frames 1, 1 + n, 1 + 2 n, ... of every run
   std::size_t picture = 0;      ///< index into Image::pictures
+  std::size_t camera = 0;       ///< index into ChannelTable::cameras
 };
 
-/// Pixels that channels of one band, window and output share.
+/// A camera renders the images of channels that look alike. The cameras of a frame show one scene
+/// at one instant, each in an image of its own.
+struct Camera {
+  scene::ChannelCamera mount;
+  bool along_projector = false;  ///< it looks along the projector of a motion simulator
+  ChannelSet channels = kAllChannels;
+};
+
+/// Pixels that channels of one camera, band, window and output share.
 struct Picture {
+  std::size_t camera = 0;                  ///< index into ChannelTable::cameras
   std::size_t plane = 0;                   ///< index into FrameView::radiance_w_m2_sr
   scene::PixelRect window_px;              ///< part of the sensor's image
   scene::ChannelOutput output;             ///< settings of the chain
@@ -54,9 +64,16 @@ struct Picture {
 struct ChannelTable {
   std::vector<Channel> channels;
   std::vector<Picture> pictures;
+  std::vector<Camera> cameras;
 };
 
 [[nodiscard]] std::string_view to_string(scene::ChannelKind kind) noexcept;
+
+/// Returns the cameras of a scenario's channels, in the order of their first channels. Without
+/// channels it is one.
+/// @param motion  with a motion simulator projector channels have a camera of their own
+[[nodiscard]] std::vector<Camera> cameras_of(const std::optional<scene::ScenarioDesc>& scenario,
+                                             bool motion);
 
 /// Channels of a scenario, or the one channel of canned frames without a scenario, with all memory
 /// that their images take. The sensor's size is the source's. A scenario without channels gets an
@@ -65,7 +82,8 @@ struct ChannelTable {
 /// there are more bands, channels or images than fit. Errors of OutputChain::make() name the
 /// channel.
 [[nodiscard]] physics::Result<ChannelTable> make_channels(
-    const std::optional<scene::ScenarioDesc>& scenario, const SourceInfo& source);
+    const std::optional<scene::ScenarioDesc>& scenario, const SourceInfo& source,
+    bool motion = false);
 
 /// Returns the first channel that fits; empty fields fit anything; nullptr: none.
 [[nodiscard]] const Channel* find_channel(const std::vector<Channel>& channels,

@@ -98,7 +98,8 @@ struct Context {
   MotionTimes motion_times;
   FrameTrace trace;
   Doorbells bells;
-  std::vector<Channel> channels;  ///< fixed before the agents run
+  std::vector<Channel> channels;             ///< fixed before the agents run
+  std::vector<Camera> cameras = {Camera{}};  ///< fixed likewise
   std::vector<Picture> pictures;  ///< fixed likewise; the render agent fills their copies
   /// Pictures shift: the motion agent hands measurements to the render agent too. Fixed likewise.
   bool shifts_pictures = false;
@@ -173,6 +174,8 @@ struct Context {
       return Counter::refused_overloaded;
     case StatusCode::invalid_environment:
       return Counter::refused_invalid_environment;
+    case StatusCode::invalid_view:
+      return Counter::refused_invalid_view;
     case StatusCode::ok:
     case StatusCode::internal:
       break;

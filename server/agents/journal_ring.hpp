@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <cstring>
@@ -42,7 +43,17 @@ struct JournalHostFrame {
   physics::Pose seeker;
   std::optional<protocol::PoseRates> seeker_rates;
   std::optional<protocol::EnvironmentData> environment;
+  std::optional<double> fov_h_rad;
+  std::optional<glm::dvec3> gimbal_rad;
   std::uint32_t entity_count = 0;
+};
+
+/// Image of a further camera of a frame.
+struct JournalShot {
+  physics::Pose pose;
+  double fov_h_rad = 0.0;
+  std::uint32_t channel = 0;  ///< index of the first channel that shows it
+  std::uint32_t crc32c = 0;   ///< of the pixels of that channel
 };
 
 /// Head of a line with a frame. entity_count renderer::EntityUpdate follow.
@@ -54,6 +65,7 @@ struct JournalFrame {
   std::int64_t pose_sim_time_ns = 0;
   std::int64_t thermal_time_ns = 0;
   physics::Pose sensor_pose;
+  double fov_h_rad = 0.0;
   std::uint32_t flags = 0;
   std::uint32_t quality_rung = 0;
   std::uint32_t radiance_crc32c = 0;
@@ -62,6 +74,8 @@ struct JournalFrame {
   std::uint64_t trigger_number = 0;
   std::int64_t slot_begin_ns = 0;
   glm::vec2 shift_px{0.0F};
+  std::uint32_t more_shot_count = 0;
+  std::array<JournalShot, kMaxCameras - 1> more_shots;
   std::uint32_t entity_count = 0;
 };
 

@@ -21,7 +21,8 @@
 namespace emit::server {
 
 inline constexpr std::size_t kMaxPlanes = 16;
-inline constexpr std::size_t kMaxSlots = 16;
+inline constexpr std::size_t kMaxSlots = 32;
+inline constexpr std::size_t kMaxCameras = 4;
 inline constexpr std::size_t kMaxPictures = 16;
 
 /// Set of channels. Bit k stands for channel k.
@@ -62,14 +63,25 @@ struct StatusReply {
 /// Largest number of weather changes that come with one frame. Further ones replace the newest.
 inline constexpr std::size_t kMaxWeatherPerFrame = 32;
 
+/// One camera's part in a frame.
+struct CameraShot {
+  bool due = false;  ///< false: no channel of this camera shows the frame
+  physics::Pose pose;
+  double fov_h_rad = 0.0;      ///< horizontal; 0: that of the source
+  scene::PixelRect window_px;  ///< part of the image that its channels are made of
+};
+
 /// Message of conductor to render agent, in the order in which the source must see it. The weather
 /// of a frame is applied first, then its entities.
 struct RenderJob {
   enum class Kind : std::uint8_t { frame, reset };
   Kind kind = Kind::frame;
-  renderer::FrameRequest request;      ///< the render agent chooses its quality level
-  std::int64_t deadline_ns = 0;        ///< when the pixels are due; 0: whenever
-  ChannelSet channels = kAllChannels;  ///< channels that the frame is for
+  /// The part that all shots have in common, with the number of the first one; those that follow
+  /// count on. The render agent chooses the quality level.
+  renderer::FrameRequest request;
+  std::array<CameraShot, kMaxCameras> shots;  ///< by camera
+  std::int64_t deadline_ns = 0;               ///< when the pixels are due; 0: whenever
+  ChannelSet channels = kAllChannels;         ///< channels that the frame is for
   // Motion simulator: what the shift of the image follows from.
   ShownAttitude attitude;
   std::int64_t display_ns = 0;  ///< wall instant at which the frame is shown
@@ -79,16 +91,47 @@ struct RenderJob {
   std::array<renderer::EntityUpdate, protocol::kMaxEntitiesPerFrame> entities;
 };
 
-/// Pixels of one image, in memory of the source or that of the images for the same slot.
+/// Image of a camera in a finished frame.
+struct CameraImage {
+  bool shown = false;
+  renderer::SlotIndex slot = 0;
+  physics::Pose pose;
+  double fov_h_rad = 0.0;
+  std::uint32_t nonfinite_px = 0;
+  std::uint32_t clamped_px = 0;
+  bool coarse = false;  ///< the surface was not prepared for this camera
+  std::uint8_t quality_level = 0;
+  std::int64_t readback_end_ns = 0;  ///< its pixels were in memory
+  std::uint32_t flags = 0;           ///< those of kCameraFlags that it has
+  float estimated_error_k = 0.0F;
+};
+/// Flags that cameras of one frame have each for themselves.
+inline constexpr std::uint32_t kCameraFlags = protocol::kFlagLate | protocol::kFlagDegraded |
+                                              protocol::kFlagNonFinite | protocol::kFlagClamped;
+
+/// Pixels of one frame, in memory of the source or that of the images for the same slot.
 struct Image {
   FrameSource* source = nullptr;
-  renderer::SlotIndex slot = 0;
+  renderer::SlotIndex slot = 0;  ///< of the first camera that shows it
+  std::size_t camera_count = 1;  ///< above 1: `cameras` has what each showed, and the slots
+  std::array<CameraImage, kMaxCameras> cameras;
   ChannelSet channels = kAllChannels;  ///< channels that show it; others have no image
   std::array<std::span<const float>, kMaxPictures> pictures;
   std::array<std::uint32_t, kMaxPictures> crc32c{};
   std::array<std::uint32_t, kMaxPictures> clamped_px{};  ///< by the drive tables of the outputs
   /// Shift by which the pictures that shift were moved, right and down in the sensor's image.
   glm::vec2 shift_px{0.0F};
+
+  /// Gives the pixels back to the source. RT-safe.
+  void release() const noexcept {
+    if (camera_count == 1) {
+      source->release(slot);
+      return;
+    }
+    for (const CameraImage& camera : cameras) {
+      if (camera.shown) source->release(camera.slot);
+    }
+  }
 };
 
 /// Message of render agent to conductor, in order of submission.

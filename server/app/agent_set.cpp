@@ -19,8 +19,13 @@ namespace {
 using physics::Error;
 using physics::ErrorCode;
 
-std::uint32_t slot_count(const config::DaemonConfig& config) {
-  return std::clamp<std::uint32_t>(config.stream.queue_frames + 3, 4, kMaxSlots);
+/// Returns the slots of a source. A frame takes one for each camera.
+std::uint32_t slot_count(const config::DaemonConfig& config,
+                         const std::optional<scene::ScenarioDesc>& scenario) {
+  const auto cameras =
+      static_cast<std::uint32_t>(cameras_of(scenario, config.motion.enabled()).size());
+  const auto frames = std::clamp<std::uint32_t>(config.stream.queue_frames + 3, 4, 16);
+  return std::min(cameras * frames, static_cast<std::uint32_t>(kMaxSlots));
 }
 
 }  // namespace
@@ -36,7 +41,7 @@ physics::Result<void> AgentSet::open_receiver() {
 FrameSourceFactory AgentSet::configured_source(renderer::WarmUpProgress progress) const {
   if (config_.source.kind == config::SourceKind::canned) {
     return [this] {
-      return make_canned_source(config_.source, slot_count(config_),
+      return make_canned_source(config_.source, slot_count(config_, scenario_),
                                 scenario_ ? scenario_->bands.size() : 1);
     };
   }
@@ -44,7 +49,7 @@ FrameSourceFactory AgentSet::configured_source(renderer::WarmUpProgress progress
     renderer::DeviceOptions device;
     device.gpu_index = config_.device.gpu_index;
     renderer::OutputOptions output;
-    output.slots = slot_count(config_);
+    output.slots = slot_count(config_, scenario_);
     const bool deadlines =
         config_.pacing.mode != config::PacingMode::host_step || config_.pacing.budget_ns > 0;
     output.ladder = deadlines ? renderer::Ladder::live : renderer::Ladder::none;
@@ -95,8 +100,9 @@ physics::Result<Recorder::Opened> AgentSet::make_recorder(const ProcessNames& na
 
 physics::Result<void> AgentSet::make_sender() {
   // Three slots beside the window: one is being rendered, one is on its way here, one is free.
+  const auto frames = source().slots / static_cast<std::uint32_t>(context_.cameras.size());
   const std::uint32_t window =
-      std::min(std::max(config_.stream.queue_frames, 1U), std::max(source().slots, 4U) - 3);
+      std::min(std::max(config_.stream.queue_frames, 1U), std::max(frames, 4U) - 3);
   if (!config_.stream.shm.empty()) {
     auto shm = ShmClient::create(config_.stream, context_.channels, receiver().welcome(),
                                  context_.clock.tai_ns());
@@ -171,6 +177,14 @@ void AgentSet::make_conductor(TriggerInput* triggers) {
   options.first_time_ns = config_.source.first_time_ns;
   options.gateway = gateway_ != nullptr;
   options.motion = motion_plan_ ? &*motion_plan_ : nullptr;
+  if (scenario_ && !options.canned) {
+    options.fov_h_rad = scenario_->sensor.fov_h_rad;
+    // The optics of a projector do not zoom with the host.
+    const bool is_fixed = std::ranges::any_of(context_.cameras, [](const Camera& camera) {
+      return camera.along_projector && camera.mount.fov_h_rad == 0.0;
+    });
+    options.fov_h_min_rad = is_fixed ? options.fov_h_rad : scenario_->sensor.narrowest_fov_rad();
+  }
   conductor_ = std::make_unique<Conductor>(context_, tracks_, options, triggers);
 }
 

@@ -137,12 +137,13 @@ physics::Result<void> DaemonImpl::open_ports() {
 
 physics::Result<void> DaemonImpl::make_agents() {
   const SourceInfo& source = agents_.source();
-  auto channels = make_channels(scenario_, source);
+  auto channels = make_channels(scenario_, source, config_.motion.enabled());
   if (!channels) {
     return tl::unexpected<Error>(std::move(channels.error()));
   }
   context_.channels = std::move(channels->channels);
   context_.pictures = std::move(channels->pictures);
+  context_.cameras = std::move(channels->cameras);
   context_.shifts_pictures =
       std::ranges::any_of(context_.pictures, [](const Picture& each) { return each.shifts(); });
   const ProcessNames names{build_text("emitd"), scenario_ ? scenario_->name : std::string(),

@@ -44,11 +44,9 @@ JournalPlayer::~JournalPlayer() {
 }
 
 void JournalPlayer::release_shown() noexcept {
-  if (shown_) {
-    source_.release(*shown_);
-    shown_.reset();
-    view_ = nullptr;
-  }
+  for (const renderer::SlotIndex slot : shown_) source_.release(slot);
+  shown_.clear();
+  view_ = nullptr;
 }
 
 physics::Result<std::optional<ReplayedFrame>> JournalPlayer::apply(const v1::JournalEntry& entry) {
@@ -97,6 +95,48 @@ physics::Result<std::optional<ReplayedFrame>> JournalPlayer::apply(const v1::Jou
   return play(entry.frame(), entry.sequence());
 }
 
+template <class Shot>
+physics::Result<void> JournalPlayer::play_shot(const v1::FrameDecision& decision, const Shot& shot,
+                                               std::uint64_t sequence) {
+  const auto fail = [&](ErrorCode code, const std::string& text) {
+    return make_error(code, fmt::format("journal entry {}: {}", sequence, text));
+  };
+  renderer::FrameRequest request;
+  request.frame_number = ++render_number_;
+  request.sim_time_ns = decision.sim_time_ns();
+  request.thermal_time_ns = decision.thermal_time_ns();
+  request.sensor_pose = exact_pose(shot.sensor_pose());
+  if (!physics::is_valid(request.sensor_pose)) {
+    return fail(ErrorCode::protocol, "bad sensor pose");
+  }
+  request.fov_h_rad = shot.fov_h_rad();
+  if (!(request.fov_h_rad >= 0.0 && request.fov_h_rad < physics::kPi)) {
+    return fail(ErrorCode::protocol, fmt::format("bad field of view: {} rad", request.fov_h_rad));
+  }
+  request.quality_level = static_cast<std::uint8_t>(
+      std::min<std::uint32_t>(decision.quality_rung(), std::numeric_limits<std::uint8_t>::max()));
+  const int slot = source_.submit(request);
+  if (slot < 0) {
+    return fail(ErrorCode::internal, "the source has no free slot");
+  }
+  shown_.push_back(static_cast<renderer::SlotIndex>(slot));
+  const renderer::FrameView& view = source_.collect(shown_.back());
+  if (shot.radiance_channel() >= channels_.channels.size()) {
+    return fail(ErrorCode::protocol,
+                fmt::format("the scenario has no channel {}", shot.radiance_channel()));
+  }
+  const Channel& channel = channels_.channels[shot.radiance_channel()];
+  const glm::vec2 shift_px(decision.applied_shift_x_px(), decision.applied_shift_y_px());
+  const std::uint32_t crc = protocol::crc32c(std::as_bytes(
+      take_picture(channels_.pictures[channel.picture], view, shown_.back(), shift_px).pixels));
+  crcs_match_ = crcs_match_ && crc == shot.radiance_crc32c();
+  if (shown_.size() == 1) {
+    view_ = &view;
+    view_crc_ = crc;
+  }
+  return {};
+}
+
 physics::Result<std::optional<ReplayedFrame>> JournalPlayer::play(const v1::FrameDecision& decision,
                                                                   std::uint64_t sequence) {
   const auto fail = [&](ErrorCode code, const std::string& text) {
@@ -129,30 +169,15 @@ physics::Result<std::optional<ReplayedFrame>> JournalPlayer::play(const v1::Fram
     }
     source_.apply_entities(decision.sim_time_ns(), updates);
 
-    renderer::FrameRequest request;
-    request.frame_number = ++render_number_;
-    request.sim_time_ns = decision.sim_time_ns();
-    request.thermal_time_ns = decision.thermal_time_ns();
-    request.sensor_pose = exact_pose(decision.sensor_pose());
-    if (!physics::is_valid(request.sensor_pose)) {
-      return fail(ErrorCode::protocol, "bad sensor pose");
+    crcs_match_ = true;
+    if (auto played = play_shot(decision, decision, sequence); !played) {
+      return tl::unexpected<physics::Error>(std::move(played.error()));
     }
-    request.quality_level = static_cast<std::uint8_t>(
-        std::min<std::uint32_t>(decision.quality_rung(), std::numeric_limits<std::uint8_t>::max()));
-    const int slot = source_.submit(request);
-    if (slot < 0) {
-      return fail(ErrorCode::internal, "the source has no free slot");
+    for (const v1::CameraDecision& camera : decision.more_cameras()) {
+      if (auto played = play_shot(decision, camera, sequence); !played) {
+        return tl::unexpected<physics::Error>(std::move(played.error()));
+      }
     }
-    shown_ = static_cast<renderer::SlotIndex>(slot);
-    view_ = &source_.collect(*shown_);
-    if (decision.radiance_channel() >= channels_.channels.size()) {
-      return fail(ErrorCode::protocol,
-                  fmt::format("the scenario has no channel {}", decision.radiance_channel()));
-    }
-    const Channel& channel = channels_.channels[decision.radiance_channel()];
-    const glm::vec2 shift_px(decision.applied_shift_x_px(), decision.applied_shift_y_px());
-    view_crc_ = protocol::crc32c(std::as_bytes(
-        take_picture(channels_.pictures[channel.picture], *view_, *shown_, shift_px).pixels));
   } else if (view_ == nullptr) {
     return fail(ErrorCode::protocol, "repeats a frame, but none was rendered before");
   }
@@ -168,7 +193,7 @@ physics::Result<std::optional<ReplayedFrame>> JournalPlayer::play(const v1::Fram
   frame.view = view_;
   frame.crc32c = view_crc_;
   frame.journal_crc32c = decision.radiance_crc32c();
-  frame.matches = frame.crc32c == frame.journal_crc32c;
+  frame.matches = frame.crc32c == frame.journal_crc32c && crcs_match_;
   ++frames_;
   mismatches_ += frame.matches ? 0 : 1;
   return std::optional<ReplayedFrame>(frame);

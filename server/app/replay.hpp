@@ -30,7 +30,7 @@ struct ReplayedFrame {
   const renderer::FrameView* view = nullptr;
   std::uint32_t crc32c = 0;          ///< CRC of the first channel that showed it, computed here
   std::uint32_t journal_crc32c = 0;  ///< CRC that the live run sent
-  bool matches = false;              ///< crc32c == journal_crc32c
+  bool matches = false;              ///< crc32c == journal_crc32c, and so for its further cameras
 };
 
 /// Re-renders a journal: hands the inputs to a FrameSource as the live run did, in the same order.
@@ -62,6 +62,11 @@ class JournalPlayer {
 
  private:
   struct PendingWeather;
+  /// Renders what one camera showed. `shot` is the decision, for the first one, or one of its
+  /// CameraDecision.
+  template <class Shot>
+  [[nodiscard]] physics::Result<void> play_shot(const v1::FrameDecision& decision, const Shot& shot,
+                                                std::uint64_t sequence);
   void release_shown() noexcept;
   [[nodiscard]] physics::Result<std::optional<ReplayedFrame>> play(
       const v1::FrameDecision& decision, std::uint64_t sequence);
@@ -71,7 +76,8 @@ class JournalPlayer {
   std::uint64_t run_id_ = 0;
   std::uint64_t last_sequence_ = 0;
   bool started_ = false;
-  std::optional<renderer::SlotIndex> shown_;  ///< slot of the last image, kept for repeats
+  std::vector<renderer::SlotIndex> shown_;  ///< slots of the last frame, kept for repeats
+  bool crcs_match_ = false;                 ///< of all its cameras
   const renderer::FrameView* view_ = nullptr;
   std::uint32_t view_crc_ = 0;
   std::vector<PendingWeather> weather_;  ///< accepted, but not used by a frame yet

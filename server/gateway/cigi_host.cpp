@@ -200,6 +200,7 @@ void CigiHost::forget() noexcept {
   weather_.clear();
   told_count_ = 0;
   sky_.reset();
+  fov_h_rad_.reset();
   told_no_seeker_ = told_timeless_ = false;
   frame_pending_ = false;
   awaits_ = false;
@@ -267,24 +268,50 @@ void CigiHost::take_view(const cigi::ViewDefinition& packet) noexcept {
     no_effect(packet, "another view than the sensor's");
     return;
   }
-  if (options_.scenario == nullptr) return;
-  // The scenario fixes the field of view. A host that thinks of another one has to know.
-  const scene::SensorDesc& sensor = options_.scenario->sensor;
-  const double half_h_deg = 0.5 * sensor.fov_h_rad / physics::kDegree;
-  const double half_v_deg =
-      std::atan(std::tan(0.5 * sensor.fov_h_rad) * sensor.height_px / sensor.width_px) /
-      physics::kDegree;
-  const auto differs = [](bool enabled, double value_deg, double wanted_deg) {
-    constexpr double kToleranceDeg = 0.01;
-    return enabled && std::abs(value_deg - wanted_deg) > kToleranceDeg;
-  };
-  if (differs(packet.left_enabled, packet.left_deg, -half_h_deg) ||
-      differs(packet.right_enabled, packet.right_deg, half_h_deg) ||
-      differs(packet.top_enabled, packet.top_deg, half_v_deg) ||
-      differs(packet.bottom_enabled, packet.bottom_deg, -half_v_deg)) {
-    no_effect(packet, "the scenario fixes another field of view");
-  }
   if (packet.mirror != cigi::Mirror::none) no_effect(packet, "channels say how they mirror");
+  if (options_.scenario == nullptr) return;
+  const scene::SensorDesc& sensor = options_.scenario->sensor;
+  const double aspect = static_cast<double>(sensor.height_px) / sensor.width_px;
+  constexpr double kToleranceDeg = 0.01;
+  const double now_rad = fov_h_rad_.value_or(sensor.fov_h_rad);
+  const double now_h_deg = 0.5 * now_rad / physics::kDegree;
+  const double now_v_deg = std::atan(std::tan(0.5 * now_rad) * aspect) / physics::kDegree;
+  // Sides that are not enabled stay where they are.
+  const double left_deg = packet.left_enabled ? packet.left_deg : -now_h_deg;
+  const double right_deg = packet.right_enabled ? packet.right_deg : now_h_deg;
+  const bool is_wide = packet.left_enabled || packet.right_enabled;
+  const bool is_high = packet.top_enabled || packet.bottom_enabled;
+  if (!is_wide && !is_high) return;
+  double half_h_rad = 0.5 * (right_deg - left_deg) * physics::kDegree;
+  const double square_v_deg =
+      is_wide ? std::atan(std::tan(half_h_rad) * aspect) / physics::kDegree : now_v_deg;
+  const double top_deg = packet.top_enabled ? packet.top_deg : square_v_deg;
+  const double bottom_deg = packet.bottom_enabled ? packet.bottom_deg : -square_v_deg;
+  if (std::abs(left_deg + right_deg) > kToleranceDeg ||
+      std::abs(top_deg + bottom_deg) > kToleranceDeg) {
+    no_effect(packet, "the optical axis is the centre of the image");
+    return;
+  }
+  if (!is_wide) {
+    half_h_rad = std::atan(std::tan(top_deg * physics::kDegree) / aspect);
+  } else if (std::abs(top_deg - square_v_deg) > kToleranceDeg) {
+    no_effect(packet, "pixels are square, and these angles make them oblong");
+    return;
+  }
+  const double fov_h_rad = 2.0 * half_h_rad;
+  if (sensor.narrowest_fov_rad() == sensor.fov_h_rad) {
+    // Hosts state again what they know of the sensor, in their own rounding.
+    if (std::abs(half_h_rad / physics::kDegree - now_h_deg) <= kToleranceDeg) return;
+    no_effect(packet, "the scenario fixes another field of view");
+    return;
+  }
+  constexpr double kSlackRad = 1e-3 * physics::kDegree;  // float32 degrees round
+  if (!(fov_h_rad >= sensor.narrowest_fov_rad() - kSlackRad &&
+        fov_h_rad <= sensor.fov_h_rad + kSlackRad)) {
+    no_effect(packet, "the field of view is not within sensor.fov_h_min_deg to sensor.fov_h_deg");
+    return;
+  }
+  fov_h_rad_ = std::clamp(fov_h_rad, sensor.narrowest_fov_rad(), sensor.fov_h_rad);
 }
 
 void CigiHost::take_sky(const cigi::CelestialSphereControl& packet) noexcept {
@@ -375,6 +402,8 @@ bool CigiHost::next(protocol::HostFrameData& frame, std::int64_t /*now_ns*/) noe
   frame.received_ns = received_ns_;
   entities_.fill(frame);
   frame.environment = weather_.take_change(frame.sim_time_ns);
+  frame.fov_h_rad = fov_h_rad_;
+  frame.gimbal_rad.reset();
   if (!check(frame)) {
     // The next frame tells all that this one would have told.
     entities_.mark_all(false);

@@ -122,6 +122,7 @@ class CigiHost final : public HostGateway {
   std::array<std::pair<std::uint16_t, const char*>, kMaxTold> told_{};
   std::size_t told_count_ = 0;
   std::optional<protocol::cigi::CelestialSphereControl> sky_;  ///< the latest of this run
+  std::optional<double> fov_h_rad_;  ///< as View Definition has set it in this run
   bool told_no_seeker_ = false;
   bool told_timeless_ = false;
 };

@@ -216,6 +216,8 @@ bool DisExercise::next(protocol::HostFrameData& frame, std::int64_t now_ns) noex
   frame.run_id = run_id_;
   frame.received_ns = now_ns;
   frame.environment.reset();
+  frame.fov_h_rad.reset();
+  frame.gimbal_rad.reset();
   frame.entity_count = 0;
   for (std::size_t i = 1; i < entities_.size(); ++i) {
     Entity& entity = entities_[i];

@@ -47,6 +47,8 @@ bool NetFdmModel::next(protocol::HostFrameData& frame, std::int64_t /*now_ns*/) 
   frame.received_ns = received_ns_;
   frame.entity_count = 0;
   frame.environment.reset();
+  frame.fov_h_rad.reset();
+  frame.gimbal_rad.reset();
   const physics::GeoPlace place = {physics::Radians(state_.latitude_rad),
                                    physics::Radians(state_.longitude_rad),
                                    physics::Metres(state_.altitude_m)};

@@ -39,6 +39,7 @@ namespace emit::server {
   X(refused_overloaded, "connections or updates refused: limit reached")                   \
   X(refused_internal, "messages refused: failure inside emitd")                            \
   X(refused_invalid_environment, "host frames refused: invalid environment")               \
+  X(refused_invalid_view, "fields of view refused: outside the sensor's range")            \
   X(statuses_suppressed, "answers not sent: rate limit, no room, or to an answer")         \
   X(connections_accepted, "TCP connections accepted")                                      \
   X(connections_closed, "TCP connections closed")                                          \

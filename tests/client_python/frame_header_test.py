@@ -10,7 +10,7 @@ from wire import HEADER_DEFAULTS, crc32c_bit_by_bit, frame_header
 
 
 def with_crc(raw: bytes) -> bytes:
-    return raw[:316] + struct.pack("<I", crc32c_bit_by_bit(raw[:316]))
+    return raw[:380] + struct.pack("<I", crc32c_bit_by_bit(raw[:380]))
 
 
 class FrameHeaderBytes(unittest.TestCase):
@@ -77,8 +77,8 @@ class FrameHeaderBytes(unittest.TestCase):
     def test_faults_are_named(self):
         good = frame_header()
         self.assertNotIn("magic", HEADER_DEFAULTS.keys() - {"magic"})
-        for raw, text in ((good[:319], "319 bytes, 320 needed"), (frame_header(magic=1), "magic 0x00000001"),
-                          (frame_header(version=2), "version 2, this is version 1"),
+        for raw, text in ((good[:383], "383 bytes, 384 needed"), (frame_header(magic=1), "magic 0x00000001"),
+                          (frame_header(version=1), "version 1, this is version 2"),
                           (frame_header(header_bytes=319), "size field 319"),
                           (good[:100] + b"\x01" + good[101:], "CRC"),
                           (frame_header(pixel_format=2), "unknown pixel format 2"),

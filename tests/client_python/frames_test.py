@@ -106,7 +106,7 @@ class SameFrames(unittest.TestCase):
 
     def test_small_and_large_fragments(self):
         with Daemon(pacing=IG_CLOCK) as daemon:
-            for payload_bytes in (320, 8900, 65472):
+            for payload_bytes in (384, 8900, 65472):
                 with FrameClient.connect(daemon.udp_url) as client:
                     client.subscribe(fragment_payload_bytes=payload_bytes)
                     self.assertEqual(client.terms.fragment_payload_bytes, payload_bytes)

@@ -54,7 +54,7 @@ class Whole(Case):
             self.assertEqual(frame.header.flags, set())
 
     def test_every_payload_length(self):
-        for number, payload_bytes in enumerate((320, 324, 640, 1440, 8900, 9600, 9604, 9920, 9924, 20_000, 65_472), 1):
+        for number, payload_bytes in enumerate((384, 388, 768, 1440, 8900, 9600, 9604, 9920, 9924, 20_000, 65_472), 1):
             self.push(self.datagrams(number, payload_bytes=payload_bytes))
             (frame,) = self.pop_all()
             self.expect_whole(frame, number)
@@ -118,7 +118,7 @@ class Lost(Case):
         image = self.image(1)
         self.assertTrue(np.array_equal(partial.pixels[partial.validity], image[partial.validity]))
         self.assertFalse(partial.pixels[~partial.validity].any())
-        first_missing = (3 * 1440 - 320) // 4
+        first_missing = (3 * 1440 - 384) // 4
         self.assertFalse(partial.validity.reshape(-1)[first_missing])
         self.assertTrue(partial.validity.reshape(-1)[first_missing - 1])
         self.expect_whole(whole, 2)
@@ -154,8 +154,8 @@ class Lost(Case):
         self.assertEqual(self.reassembler.frames_unusable, 1)
 
     def test_a_lost_second_header_alone_is_not_partial(self):
-        # The second header has a fragment of its own if the payload is 320 bytes.
-        datagrams = self.datagrams(1, payload_bytes=320)
+        # The second header has a fragment of its own if the payload is 384 bytes.
+        datagrams = self.datagrams(1, payload_bytes=384)
         del datagrams[-1]
         self.push(datagrams)
         self.reassembler.flush()
@@ -196,8 +196,8 @@ class Refused(Case):
                                  (changed(4, "B", 2), "wrong_version"), (changed(6, "<H", 4), "foreign"),
                                  (good[:-4], "short_input"), (good + bytes(4), "bad_length"),
                                  (changed(20, "<H", 0), "bad_length"), (changed(12, "<I", 1442), "bad_offset"),
-                                 (changed(12, "<I", 10_000_000), "bad_offset"), (changed(16, "<I", 640), "oversize"),
-                                 (changed(16, "<I", 4 * WIDTH_PX * HEIGHT_PX + 960), "oversize"),
+                                 (changed(12, "<I", 10_000_000), "bad_offset"), (changed(16, "<I", 768), "oversize"),
+                                 (changed(16, "<I", 4 * WIDTH_PX * HEIGHT_PX + 1152), "oversize"),
                                  (changed(5, "B", 1), "inconsistent"), (changed(5, "B", 2), "inconsistent")):
             self.assertEqual(self.reassembler.push(datagram), status)
         self.assertEqual(self.reassembler.push(good), "accepted")
@@ -227,7 +227,7 @@ class Hostile(Case):
         for _ in range(5000):
             datagram = bytearray(chance.choice(good))
             for _ in range(chance.randint(0, 3)):
-                datagram[chance.randrange(min(len(datagram), 32 + 320))] = chance.choice((0, 1, 2, 127, 255))
+                datagram[chance.randrange(min(len(datagram), 32 + 384))] = chance.choice((0, 1, 2, 127, 255))
             if chance.random() < 0.1:
                 del datagram[chance.randrange(len(datagram)):]
             if chance.random() < 0.5:

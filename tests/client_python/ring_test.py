@@ -32,7 +32,7 @@ class Ring:
         welcome = control_pb2.Welcome(protocol_version=1, software="test", channels=channels).SerializeToString()
         self.slot_bytes = 3 * PAGE_BYTES
         self.slots_offset = PAGE_BYTES
-        self.entries = [(64 + 320 * i, PAGE_BYTES * (1 + i), 4 * WIDTH_PX * HEIGHT_PX) for i in range(2)]
+        self.entries = [(64 + 384 * i, PAGE_BYTES * (1 + i), 4 * WIDTH_PX * HEIGHT_PX) for i in range(2)]
         total = self.slots_offset + SLOTS * self.slot_bytes
         self.head = struct.pack("<IHHIIQQQQQQq", 0x534D4645, 2, 0, SLOTS, 2, total, self.slot_bytes, self.slots_offset,
                                 192, 192 + 64, len(welcome), 1)
@@ -78,7 +78,7 @@ class Ring:
             header = frame_header(**{"width_px": WIDTH_PX, "height_px": HEIGHT_PX, "frame_number": number,
                                      "channel_index": channel, "payload_crc32c": crc32c(pixels), **fields})
             at = self.slot() + header_at
-            self.memory[at:at + 320] = header if channel in channels else bytes(320)
+            self.memory[at:at + 384] = header if channel in channels else bytes(384)
             at = self.slot() + pixels_at
             self.memory[at:at + length] = pixels.tobytes()
         self.commit()

@@ -2,7 +2,7 @@
 """Bytes as the wire format has them, made here a second time and in the plainest way."""
 import struct
 
-HEADER_LAYOUT = "<IBBBBHHIIffIfIIIQQQQqqqqqqqqqqQdddddddBBBBfqqQffIIIIIIBBHfffqf"
+HEADER_LAYOUT = "<IBBBBHHIIffIfIIIQQQQqqqqqqqqqqQdddddddBBBBfqqQffIIIIIIBBHfffqff60s"
 
 
 def crc32c_bit_by_bit(data: bytes) -> int:
@@ -15,7 +15,7 @@ def crc32c_bit_by_bit(data: bytes) -> int:
 
 
 HEADER_DEFAULTS = dict(
-    magic=0x524D4645, version=1, pixel_format=1, quantity=1, channel_kind=0, header_bytes=320, channel_index=0,
+    magic=0x524D4645, version=2, pixel_format=1, quantity=1, channel_kind=0, header_bytes=384, channel_index=0,
     width_px=1, height_px=1, band_lo_um=3.0, band_hi_um=5.0, flag_bits=0, estimated_error_k=0.0, nonfinite_px=0,
     clamped_px=0, payload_crc32c=0, payload_bytes=None, run_id=1, frame_number=1, host_frame_number=0, sim_time_ns=0,
     pose_sim_time_ns=0, host_received_ns=0, deadline_ns=0, render_start_ns=0, render_end_ns=0, readback_end_ns=0,
@@ -24,7 +24,8 @@ HEADER_DEFAULTS = dict(
     quality_level=0, encoding=0, output_step_bits=0, reserved=0, applied_shift_x_px=0.0, previous_jitter_ns=0, slot_begin_ns=0, trigger_number=0, prediction_error_m=0.0,
     prediction_error_rad=0.0, predictions=0, window_x_px=0, window_y_px=0, sensor_width_px=0, sensor_height_px=0,
     encoded_bytes=0, motion_state=0, motion_fault_bits=0, reserved_motion=0, shift_x_px=0.0, shift_y_px=0.0,
-    pointing_error_px=0.0, display_ns=0, applied_shift_y_px=0.0)
+    pointing_error_px=0.0, display_ns=0, applied_shift_y_px=0.0,
+    fov_h_rad=0.0, reserved_growth=b"")
 
 
 def frame_header(**fields) -> bytes:
@@ -34,7 +35,7 @@ def frame_header(**fields) -> bytes:
     if values["payload_bytes"] is None:
         values["payload_bytes"] = 4 * values["width_px"] * values["height_px"]
     head = struct.pack(HEADER_LAYOUT, *values.values())
-    assert len(head) == 316
+    assert len(head) == 380
     return head + struct.pack("<I", crc32c_bit_by_bit(head))
 
 

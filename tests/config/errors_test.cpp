@@ -135,6 +135,17 @@ const std::vector<Case>& cases() {
        "[sensor]\nwidth_px = 64\nheight_px = 48\n[[channel]]\nname = \"a\"\nband = \"3-5\"\n"
        "window_px = [0, 40, 64, 9]\n",
        "s.toml:8:13: 'window_px' reaches to column 64 and row 49; the sensor's image is 64 x 48"},
+      {"camera_narrower_than_the_sensor_may_be",
+       "[sensor]\nfov_h_deg = 20\nfov_h_min_deg = 5\n[[channel]]\nname = \"a\"\nband = \"3-5\"\n"
+       "fov_h_deg = 4\n",
+       "s.toml:8:13: 'fov_h_deg' is 4, must be 5 .. 20: the surface is prepared for "
+       "'sensor.fov_h_min_deg' to 'sensor.fov_h_deg'"},
+      {"camera_wider_than_the_sensor",
+       "[sensor]\nfov_h_deg = 20\n[[channel]]\nname = \"a\"\nband = \"3-5\"\nfov_h_deg = 21\n",
+       "s.toml:7:13: 'fov_h_deg' is 21, must be 20 .. 20: the surface is prepared for "
+       "'sensor.fov_h_min_deg' to 'sensor.fov_h_deg'"},
+      {"camera_without_carrier", "[[channel]]\nname = \"a\"\nband = \"3-5\"\ncarrier_entity = 9\n",
+       "s.toml:5:18: the scenario has no entity 9"},
       {"rate_zero", "[[channel]]\nname = \"a\"\nband = \"3-5\"\nevery_nth = 0\n",
        "s.toml:5:13: 'every_nth' is 0, must be 1 .. 1000"},
       {"no_channel_at_the_full_rate",

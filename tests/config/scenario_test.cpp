@@ -62,6 +62,7 @@ name = "cam"
 width_px = 320
 height_px = 256
 fov_h_deg = 12.3
+fov_h_min_deg = 6.0
 near_m = 0.25
 [[sensor.trajectory]]
 time_s = 0.0
@@ -95,6 +96,9 @@ kind = "injection"
 band = "7.7-9.3"
 window_px = [8, 16, 48, 32]
 every_nth = 4
+fov_h_deg = 8.0
+offset_m = [1.0, -2.0, 0.5]
+yaw_pitch_roll_deg = [90.0, -45.0, 0.0]
 [[channel]]
 name = "array"
 kind = "projector"
@@ -228,6 +232,10 @@ TEST_F(ConfigTest, every_scenario_key_reaches_its_field) {
   EXPECT_EQ(s.channels[0].every_nth, 1U);
   EXPECT_EQ(s.channels[1].window_px, (scene::PixelRect{8, 16, 48, 32}));
   EXPECT_EQ(s.channels[1].every_nth, 4U);
+  EXPECT_EQ(s.channels[0].camera, scene::ChannelCamera{});
+  EXPECT_EQ(s.channels[1].camera.fov_h_rad, 8.0 * kDegree);
+  EXPECT_EQ(s.channels[1].camera.offset_body_m, glm::dvec3(1.0, -2.0, 0.5));
+  EXPECT_EQ(s.channels[1].camera.yaw_pitch_roll_rad, glm::dvec3(90.0, -45.0, 0.0) * kDegree);
   EXPECT_EQ(s.channels[0].output, scene::ChannelOutput{});
   const scene::ChannelOutput& output = s.channels[2].output;
   EXPECT_EQ(output.mirror, scene::PictureMirror::both);

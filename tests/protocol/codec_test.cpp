@@ -227,6 +227,27 @@ TEST(HostFrameCodec, TakesTheWeatherThatScenariosTakeAndNoOther) {
   }
 }
 
+TEST(HostFrameCodec, CarriesAFieldOfViewAndRefusesWhatIsNone) {
+  auto message = valid_message();
+  HostFrameDecoder decoder;
+  const auto out = std::make_unique<HostFrameData>();
+  out->fov_h_rad = 1.0;  // of the frame before
+  ASSERT_EQ(decode_host_frame(encoded(message), decoder, *out), DecodeStatus::ok);
+  EXPECT_FALSE(out->fov_h_rad);
+  message.set_fov_h_rad(0.125);
+  ASSERT_EQ(decode_host_frame(encoded(message), decoder, *out), DecodeStatus::ok);
+  EXPECT_EQ(out->fov_h_rad, 0.125);
+  HostFrameEncoder encoder;
+  const auto again = std::make_unique<HostFrameData>();
+  ASSERT_EQ(decode_host_frame(encoder.encode(*out), decoder, *again), DecodeStatus::ok);
+  EXPECT_EQ(again->fov_h_rad, 0.125);
+  for (const double wrong : {0.0, -0.1, 3.2, std::numeric_limits<double>::infinity(),
+                             std::numeric_limits<double>::quiet_NaN()}) {
+    message.set_fov_h_rad(wrong);
+    EXPECT_EQ(decode(encoded(message)), DecodeStatus::invalid_view) << wrong;
+  }
+}
+
 TEST(HostFrameCodec, RefusesEnvironmentsOutsideTheirRanges) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   using Change = void (*)(v1::Environment&);
@@ -311,9 +332,9 @@ TEST(ControlRecord, AHostFrameWithinIsFoundWithoutParsing) {
 }
 
 TEST(DecodeStatus, HasTheNumbersOfStatusCode) {
-  for (const auto status :
-       {DecodeStatus::ok, DecodeStatus::wrong_version, DecodeStatus::oversize,
-        DecodeStatus::malformed, DecodeStatus::invalid_pose, DecodeStatus::invalid_environment}) {
+  for (const auto status : {DecodeStatus::ok, DecodeStatus::wrong_version, DecodeStatus::oversize,
+                            DecodeStatus::malformed, DecodeStatus::invalid_pose,
+                            DecodeStatus::invalid_environment, DecodeStatus::invalid_view}) {
     EXPECT_TRUE(v1::Status::Code_IsValid(static_cast<int>(status)));
     EXPECT_NE(to_string(status), "unknown");
   }

@@ -62,7 +62,7 @@ TEST(FragmentHeader, EveryLieThatOneDatagramCanTellIsNamed) {
 
 TEST(Fragmenter, AllFragmentsButTheLastHaveTheSameSizeAndCoverTheFrameOnce) {
   for (const std::uint32_t height_px : {1u, 2u, 3u, 7u, 16u, 61u}) {
-    for (std::uint32_t payload = 320; payload < 3000; payload += 52) {
+    for (std::uint32_t payload = 384; payload < 3000; payload += 52) {
       const auto frame = test::make_frame(40, height_px, 9);
       const Fragmenter fragmenter({.frame_id = 4, .row_bytes = 160, .max_payload_bytes = payload},
                                   frame.header_bytes, frame.pixels);
@@ -83,10 +83,11 @@ TEST(Fragmenter, AllFragmentsButTheLastHaveTheSameSizeAndCoverTheFrameOnce) {
       }
       ASSERT_EQ(stream.size(), fragmenter.total_bytes());
       const std::span<const std::byte> bytes(stream);
-      ASSERT_TRUE(std::ranges::equal(bytes.first(320), frame.header_bytes));
-      ASSERT_TRUE(std::ranges::equal(bytes.subspan(320, frame.pixels.size()), frame.pixels));
-      ASSERT_TRUE(std::ranges::equal(bytes.last(320), frame.header_bytes));
-      ASSERT_LT(stream.size() - 640 - frame.pixels.size(), 320u);
+      ASSERT_TRUE(std::ranges::equal(bytes.first(kFrameHeaderBytes), frame.header_bytes));
+      ASSERT_TRUE(
+          std::ranges::equal(bytes.subspan(kFrameHeaderBytes, frame.pixels.size()), frame.pixels));
+      ASSERT_TRUE(std::ranges::equal(bytes.last(kFrameHeaderBytes), frame.header_bytes));
+      ASSERT_LT(stream.size() - 2 * kFrameHeaderBytes - frame.pixels.size(), kFrameHeaderBytes);
     }
   }
 }
@@ -98,7 +99,7 @@ TEST(Fragmenter, PointsIntoTheCallersPixels) {
   const auto pieces = fragmenter.pieces(3, memory);
   ASSERT_EQ(pieces.count, 2u);
   EXPECT_EQ(pieces.piece[0].data(), memory.data());
-  EXPECT_EQ(pieces.piece[1].data(), frame.pixels.data() + 3 * 1440 - 320);
+  EXPECT_EQ(pieces.piece[1].data(), frame.pixels.data() + 3 * 1440 - kFrameHeaderBytes);
   EXPECT_EQ(pieces.bytes, 1472u);
 }
 
@@ -107,7 +108,7 @@ TEST(Fragmenter, NamesTheFirstRowOfEachFragment) {
   for (std::size_t i = 0; i < datagrams.size(); ++i) {
     FragmentHeader header;
     ASSERT_EQ(decode_fragment_header(datagrams[i], header), FragmentStatus::accepted);
-    const std::size_t expected = i == 0 ? 0 : (i * 800 - 320) / 400;
+    const std::size_t expected = i == 0 ? 0 : (i * 800 - 384) / 400;
     if (expected < 20) {
       EXPECT_EQ(header.row, expected) << i;
     }

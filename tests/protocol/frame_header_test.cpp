@@ -16,15 +16,16 @@ using ::testing::HasSubstr;
 
 // Bytes of golden_header(), written by another program after docs/wire.md, CRC included.
 constexpr std::string_view kGolden =
-    "45464d52010102014001030280020000000200000000004100004041090100000000803e03000000"
+    "45464d52020102018001030280020000000200000000004100004041090100000000803e03000000"
     "05000000d4c3b2a100001400000000008877665544332211e803000000000000e703000000000000"
     "00f2052a0100000000f7c2ffffffffff0000b49376e2fa180100b49376e2fa180200b49376e2fa18"
     "0300b49376e2fa180400b49376e2fa180500b49376e2fa18f9ffffffffffffff40e2010000000000"
     "e603000000000000000000000000f83f00000000000002c00000000000408f40000000000000e03f"
     "000000000000e0bf000000000000e03f000000000000e0bf04010000000000003412000000000000"
     "ffffb39376e2fa184d000000000000000000003f0000803e09000000020100004000000000050000"
-    "000400004523010000000000000000000000000000000000000000000000000000000000955c71ac";
-
+    "0004000045230100000000000000000000000000000000000000000000000000000000000000003e"
+    "00000000000000000000000000000000000000000000000000000000000000000000000000000000"
+    "0000000000000000000000000000000000000000652da24b";
 FrameHeader golden_header() {
   constexpr std::int64_t kWallNs = 1'800'000'000'000'000'000;
   FrameHeader header;
@@ -70,6 +71,7 @@ FrameHeader golden_header() {
   header.pose.world_from_body = {0.5, -0.5, 0.5, -0.5};
   header.payload_bytes = 640 * 512 * 4;
   header.payload_crc32c = 0xA1B2C3D4;
+  header.fov_h_rad = 0.125F;
   return header;
 }
 
@@ -83,9 +85,9 @@ std::vector<std::byte> encoded(const FrameHeader& header) {
 std::vector<std::byte> forged(std::size_t at, std::uint8_t value) {
   auto bytes = encoded(golden_header());
   bytes[at] = std::byte{value};
-  const std::uint32_t crc = crc32c(std::span(bytes).first(316));
+  const std::uint32_t crc = crc32c(std::span(bytes).first(380));
   for (std::size_t i = 0; i < 4; ++i) {
-    bytes[316 + i] = static_cast<std::byte>((crc >> (8 * i)) & 0xFFu);
+    bytes[380 + i] = static_cast<std::byte>((crc >> (8 * i)) & 0xFFu);
   }
   return bytes;
 }
@@ -132,16 +134,17 @@ TEST(FrameHeader, DecodesEveryFieldOfTheGoldenBytes) {
   EXPECT_EQ(header->sensor_height_px, expected.sensor_height_px);
   EXPECT_EQ(header->encoding, expected.encoding);
   EXPECT_EQ(header->encoded_bytes, expected.encoded_bytes);
+  EXPECT_EQ(header->fov_h_rad, expected.fov_h_rad);
   // Fields that are not compared above would differ here.
   EXPECT_EQ(to_hex(encoded(*header)), kGolden);
 }
 
 TEST(FrameHeader, RefusesWhatIsNotAHeaderAndSaysWhy) {
   const auto good = from_hex(kGolden);
-  EXPECT_THAT(error_of({}), HasSubstr("0 bytes, 320 needed"));
-  EXPECT_THAT(error_of(std::span(good).first(319)), HasSubstr("319 bytes"));
+  EXPECT_THAT(error_of({}), HasSubstr("0 bytes, 384 needed"));
+  EXPECT_THAT(error_of(std::span(good).first(383)), HasSubstr("383 bytes"));
   EXPECT_THAT(error_of(forged(0, 'X')), HasSubstr("magic"));
-  EXPECT_THAT(error_of(forged(4, 2)), HasSubstr("version 2"));
+  EXPECT_THAT(error_of(forged(4, 1)), HasSubstr("version 1, this is version 2"));
   EXPECT_THAT(error_of(forged(8, 0x44)), HasSubstr("size field"));
   EXPECT_THAT(error_of(forged(5, 9)), HasSubstr("pixel format 9"));
   EXPECT_THAT(error_of(forged(6, 0)), HasSubstr("pixel quantity 0"));
@@ -165,7 +168,7 @@ TEST(FrameHeader, RefusesSizesWhosePixelsOverflow64Bits) {
 }
 
 TEST(FrameHeader, IgnoresReservedBytesAndWhatFollows) {
-  auto bytes = forged(300, 0x55);
+  auto bytes = forged(340, 0x55);
   bytes.push_back(std::byte{1});
   EXPECT_EQ(error_of(bytes), "decoded");
 }

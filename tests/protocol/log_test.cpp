@@ -180,7 +180,7 @@ TEST_F(LogFile, ADamagedByteIsAnErrorOrChangesNothingThatIsRead) {
   const std::string whole = content();
   std::mt19937 random(3);
   int errors = 0;
-  for (int i = 0; i < 400; ++i) {
+  for (int i = 0; i < 1000; ++i) {
     std::string bytes = whole;
     bytes[random() % bytes.size()] ^= static_cast<char>(1 + random() % 255);
     set_content(bytes);
@@ -199,7 +199,8 @@ TEST_F(LogFile, ADamagedByteIsAnErrorOrChangesNothingThatIsRead) {
       if (!*more) break;
     }
   }
-  EXPECT_GT(errors, 40);
+  // Most bytes are schemas, whose damage this reader does not see.
+  EXPECT_GT(errors, 70);
 }
 
 TEST_F(LogFile, AFlippedBitInAChunkIsFoundByItsCrc) {

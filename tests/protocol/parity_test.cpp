@@ -108,9 +108,9 @@ TEST_P(ParityGeometries, AnyLossUpToTheParityIsRepaired) {
 INSTANTIATE_TEST_SUITE_P(
     Geometries, ParityGeometries,
     ::testing::Values(GeometryCase{64, 48, 400, {8, 3}}, GeometryCase{64, 48, 1400, {48, 5}},
-                      GeometryCase{100, 71, 332, {128, 32}}, GeometryCase{64, 48, 320, {1, 1}},
-                      GeometryCase{64, 48, 320, {2, 1}}, GeometryCase{4, 3, 1400, {48, 2}},
-                      GeometryCase{8, 1, 320, {48, 5}}, GeometryCase{128, 96, 65000, {4, 4}},
+                      GeometryCase{100, 71, 396, {128, 32}}, GeometryCase{64, 48, 384, {1, 1}},
+                      GeometryCase{64, 48, 384, {2, 1}}, GeometryCase{4, 3, 1400, {48, 2}},
+                      GeometryCase{8, 1, 384, {48, 5}}, GeometryCase{128, 96, 65000, {4, 4}},
                       GeometryCase{640, 512, 8900, {48, 5}}),
     [](const auto& each) {
       const GeometryCase& test = each.param;
@@ -255,7 +255,7 @@ TEST(Parity, HeadersThatContradictAreRefused) {
   header.groups = 0;
   EXPECT_EQ(status_of(header, 400), FragmentStatus::bad_parity);
   EXPECT_EQ(status_of(sound, 404), FragmentStatus::bad_parity) << "another length in one frame";
-  EXPECT_EQ(status_of(sound, 316), FragmentStatus::bad_parity);
+  EXPECT_EQ(status_of(sound, 380), FragmentStatus::bad_parity);
   EXPECT_EQ(status_of(sound, 402), FragmentStatus::bad_length);
   header = sound;
   header.total_bytes += 4;

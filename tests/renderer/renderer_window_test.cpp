@@ -64,15 +64,17 @@ class Camera {
     std::vector<float> temperature;
   };
   [[nodiscard]] Planes render(const physics::Pose& pose, std::uint8_t quality_level = 0,
-                              const scene::PixelRect& window_px = {}) {
+                              const scene::PixelRect& window_px = {}, double fov_h_rad = 0.0) {
     renderer::FrameRequest request;
     request.sim_time_ns = request.thermal_time_ns = kNowNs;
     request.sensor_pose = pose;
     request.quality_level = quality_level;
     request.window_px = window_px;
+    request.fov_h_rad = fov_h_rad;
     const auto slot = static_cast<renderer::SlotIndex>(renderer_->submit(request));
     const auto& view = renderer_->collect(slot);
     EXPECT_FALSE(view.device_failed);
+    coarse_ = view.stats.coarse;
     const auto plane = view.radiance_w_m2_sr[0];
     Planes out{{plane.begin(), plane.end()},
                {view.temperature_k.begin(), view.temperature_k.end()}};
@@ -80,8 +82,12 @@ class Camera {
     return out;
   }
 
+  /// Returns whether the frame rendered last was coarse.
+  [[nodiscard]] bool coarse() const { return coarse_; }
+
  private:
   std::unique_ptr<renderer::Renderer> renderer_;
+  bool coarse_ = false;
 };
 
 /// Number of pixels of `window` whose bits differ between two images.
@@ -119,6 +125,36 @@ void expect_windows_of(const scene::ScenarioDesc& scenario, renderer::Ladder lad
                         {0, 0, kWidthPx, kHeightPx}),
               0U)
         << "a window leaves no trace";
+  }
+}
+
+TEST(RendererFieldOfView, AFrameHasTheBitsOfASensorWithThatFieldOfView) {
+  auto scenario = box_on_ground();
+  const double wide_rad = scenario.sensor.fov_h_rad;
+  scenario.sensor.fov_h_min_rad = 0.25 * wide_rad;
+  const std::vector<double> fracs = {0.25, 0.6, 1.0};
+  std::vector<Camera::Planes> zoomed;
+  {
+    // A thread has one context at a time, so that this camera ends before the next begins.
+    Camera zooming(scenario, renderer::Ladder::none);
+    for (const double frac : fracs) {
+      zoomed.push_back(zooming.render(kHere, 0, {}, frac * wide_rad));
+      EXPECT_FALSE(zooming.coarse()) << frac;
+    }
+    for (const double frac : {0.24, 1.01}) {
+      static_cast<void>(zooming.render(kHere, 0, {}, frac * wide_rad));
+      EXPECT_TRUE(zooming.coarse()) << frac;
+    }
+  }
+  const scene::PixelRect whole{0, 0, kWidthPx, kHeightPx};
+  for (std::size_t i = 0; i < fracs.size(); ++i) {
+    auto other = box_on_ground();
+    other.sensor.fov_h_rad = fracs[i] * wide_rad;
+    Camera fixed(other, renderer::Ladder::none);
+    EXPECT_EQ(differing(fixed.render(kHere).radiance, zoomed[i].radiance, whole), 0U) << fracs[i];
+    if (i > 0) {
+      EXPECT_GT(differing(zoomed[0].radiance, zoomed[i].radiance, whole), 3000U) << fracs[i];
+    }
   }
 }
 

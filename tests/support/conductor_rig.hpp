@@ -27,6 +27,9 @@ class FakeTriggers final : public server::TriggerInput {
   std::deque<server::ReceivedTrigger> waiting;
 };
 
+inline constexpr double kFovRad = 0.4;
+inline constexpr double kFovMinRad = 0.1;
+
 /// Conductor and render agent on a fake clock; the test plays receiver and sender.
 class ConductorRig {
  public:
@@ -48,6 +51,8 @@ class ConductorRig {
     auto table = *server::make_channels(std::nullopt, *render_.source_info());
     context_.channels = std::move(table.channels);
     context_.pictures = std::move(table.pictures);
+    context_.cameras = std::move(table.cameras);
+    context_.cameras.front().along_projector = motion != nullptr && motion->projects;
     EXPECT_TRUE(conductor_.on_start());
   }
   ~ConductorRig() { render_.on_stop(); }
@@ -60,7 +65,7 @@ class ConductorRig {
       while (const server::PublishFrame* frame = context_.published.front()) {
         frames.push_back(*frame);
         if (!frame->repeat) {
-          frame->image.source->release(frame->image.slot);
+          frame->image.release();
         }
         context_.published.pop();
         ++work;
@@ -160,6 +165,8 @@ class ConductorRig {
     out.motion = motion;
     out.canned = canned;
     out.pacing = pacing;
+    out.fov_h_rad = kFovRad;
+    out.fov_h_min_rad = kFovMinRad;
     return out;
   }
 

@@ -107,7 +107,11 @@ scene::ScenarioDesc instant_scenario(const std::filesystem::path& gltf) {
   object.instances = {
       {glm::dvec3(0.0), physics::world_from_body_heading_pitch_roll(0.0, 0.0, 0.0)}};
   scenario.objects = {object};
-  scenario.sensor = {"camera", 320, 256, 40.0 * physics::kDegree, 0.1, {}};
+  scenario.sensor.name = "camera";
+  scenario.sensor.width_px = 320;
+  scenario.sensor.height_px = 256;
+  scenario.sensor.fov_h_rad = 40.0 * physics::kDegree;
+  scenario.sensor.near_m = 0.1;
   scenario.thermal.method = scene::ThermalMethod::per_frame;
   scenario.thermal.steps = 1;
   scenario.thermal.spacing = scene::StepSpacing::uniform;

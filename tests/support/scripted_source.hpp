@@ -99,6 +99,7 @@ class ScriptedSource final : public server::FrameSource {
       mix(static_cast<double>(request.thermal_time_ns));
       mix(request.sensor_pose.position_world_m.x);
       mix(static_cast<double>(request.quality_level));
+      mix(request.fov_h_rad);
       auto& pixels = pixels_[slot];
       for (std::size_t i = 0; i < pixels.size(); ++i) {
         pixels[i] = static_cast<float>(state_ + static_cast<double>(i));

@@ -2,7 +2,9 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <limits>
 
+#include "emit/physics/constants.hpp"
 #include "keys.hpp"
 
 /// Keys of a scenario's channels.
@@ -117,6 +119,55 @@ void add_output_keys(KeyTable<ChannelDesc>& keys) {
       "of radiance."));
 }
 
+/// Adds the keys of a channel that does not look as the sensor does.
+void add_camera_keys(KeyTable<ChannelDesc>& keys) {
+  keys.push_back(written_if<ChannelDesc>(
+      [](const ChannelDesc& in) { return in.camera.fov_h_rad != 0.0; },
+      number<ChannelDesc>("fov_h_deg", "deg", between(0, 170), EMIT_FIELD(camera.fov_h_rad),
+                          "Horizontal field of view of the whole image from which `window_px` is "
+                          "cut: `sensor.fov_h_min_deg` to `sensor.fov_h_deg`. 0: that of the "
+                          "sensor, which hosts may set.",
+                          physics::kDegree)));
+  keys.push_back(custom<ChannelDesc>(
+      {"offset_m", "array of 3 floats", "m", "finite",
+       "Place of the camera from the seeker, forward, right and down. Without it the same.", false},
+      [](ChannelDesc& out, const Node& node, Diagnostics& diagnostics) {
+        read_vector(node, "offset_m", 3, &out.camera.offset_body_m.x, diagnostics);
+      },
+      [](const ChannelDesc& in) -> std::optional<std::string> {
+        if (in.camera.offset_body_m == glm::dvec3(0.0)) return std::nullopt;
+        return toml_vector(&in.camera.offset_body_m.x, 3);
+      }));
+  keys.push_back(custom<ChannelDesc>(
+      {"yaw_pitch_roll_deg", "array of 3 floats", "deg", "finite",
+       "Turn of the camera against the seeker: yaw right, then pitch up, then roll right.", false},
+      [](ChannelDesc& out, const Node& node, Diagnostics& diagnostics) {
+        glm::dvec3 turn_deg(0.0);
+        read_vector(node, "yaw_pitch_roll_deg", 3, &turn_deg.x, diagnostics);
+        out.camera.yaw_pitch_roll_rad = turn_deg * physics::kDegree;
+      },
+      [](const ChannelDesc& in) -> std::optional<std::string> {
+        if (in.camera.yaw_pitch_roll_rad == glm::dvec3(0.0)) return std::nullopt;
+        const glm::dvec3 turn_deg = in.camera.yaw_pitch_roll_rad / physics::kDegree;
+        return toml_vector(&turn_deg.x, 3);
+      }));
+  keys.push_back(custom<ChannelDesc>(
+      {"carrier_entity", "integer", "", "an entity",
+       "Entity that carries the camera in place of the seeker; offset and turn are in its axes.",
+       false},
+      [](ChannelDesc& out, const Node& node, Diagnostics& diagnostics) {
+        std::int64_t id = 0;
+        const std::size_t faults = diagnostics.size();
+        read_integer(node, "carrier_entity", 0, std::numeric_limits<std::uint32_t>::max(), id,
+                     diagnostics);
+        if (diagnostics.size() == faults) out.camera.entity_id = static_cast<std::uint32_t>(id);
+      },
+      [](const ChannelDesc& in) -> std::optional<std::string> {
+        if (!in.camera.entity_id) return std::nullopt;
+        return std::to_string(*in.camera.entity_id);
+      }));
+}
+
 }  // namespace
 
 const KeyTable<ChannelDesc>& channel_keys() {
@@ -152,6 +203,7 @@ const KeyTable<ChannelDesc>& channel_keys() {
                 "The channel shows frames 1, 1 + n, 1 + 2 n and so on of every run. "
                 "At least one channel shows all.")),
     };
+    add_camera_keys(all);
     add_output_keys(all);
     return all;
   }();

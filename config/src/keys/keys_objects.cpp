@@ -217,7 +217,13 @@ const KeyTable<SensorDraft>& sensor_keys() {
         integer<SensorDraft>("width_px", "px", 1, 8192, EMIT_FIELD(desc.width_px), "Columns."),
         integer<SensorDraft>("height_px", "px", 1, 8192, EMIT_FIELD(desc.height_px), "Rows."),
         number<SensorDraft>("fov_h_deg", "deg", between(0.01, 170), EMIT_FIELD(desc.fov_h_rad),
-                            "Horizontal field of view; pixels are square.", kDegree),
+                            "Horizontal field of view; pixels are square. Hosts may set a "
+                            "narrower one.",
+                            kDegree),
+        number<SensorDraft>("fov_h_min_deg", "deg", between(0, 170), EMIT_FIELD(desc.fov_h_min_rad),
+                            "Narrowest field of view that hosts may set; the surface is prepared "
+                            "for its pixels. 0: they may set none.",
+                            kDegree),
         number<SensorDraft>("near_m", "m", between(1e-4, 1e4), EMIT_FIELD(desc.near_m),
                             "Distance of the near plane; nothing closer is drawn."),
     };

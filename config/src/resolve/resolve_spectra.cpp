@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "emit/physics/constants.hpp"
 #include "resolve.hpp"
 
 namespace emit::config {
@@ -229,6 +230,28 @@ void check_output(const Node& table, const ChannelDesc& channel, bool require_fi
   }
 }
 
+/// Reports a camera that the scenario cannot have.
+void check_camera(const Node& node, const scene::ChannelCamera& camera,
+                  const scene::ScenarioDesc& scenario, Diagnostics& diagnostics) {
+  constexpr double kSlackFrac = 1e-9;
+  const double lo_rad = scenario.sensor.narrowest_fov_rad();
+  const double hi_rad = scenario.sensor.fov_h_rad;
+  if (camera.fov_h_rad != 0.0 && (camera.fov_h_rad < (1.0 - kSlackFrac) * lo_rad ||
+                                  camera.fov_h_rad > (1.0 + kSlackFrac) * hi_rad)) {
+    diagnostics.add(key_location(node, "fov_h_deg"),
+                    fmt::format("'fov_h_deg' is {}, must be {} .. {}: the surface is prepared for "
+                                "'sensor.fov_h_min_deg' to 'sensor.fov_h_deg'",
+                                camera.fov_h_rad / physics::kDegree, lo_rad / physics::kDegree,
+                                hi_rad / physics::kDegree));
+  }
+  if (camera.entity_id && std::ranges::none_of(scenario.objects, [&](const auto& object) {
+        return object.entity_id == camera.entity_id;
+      })) {
+    diagnostics.add(key_location(node, "carrier_entity"),
+                    fmt::format("the scenario has no entity {}", *camera.entity_id));
+  }
+}
+
 }  // namespace
 
 void check_channels(const Node& root, const scene::ScenarioDesc& scenario, bool require_files,
@@ -250,6 +273,7 @@ void check_channels(const Node& root, const scene::ScenarioDesc& scenario, bool 
                                   width_px, height_px));
     }
     check_output(section->items[i], scenario.channels[i], require_files, diagnostics);
+    check_camera(section->items[i], scenario.channels[i].camera, scenario, diagnostics);
     all_frames = all_frames || scenario.channels[i].every_nth == 1;
   }
   if (!all_frames && !section->items.empty()) {

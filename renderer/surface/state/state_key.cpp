@@ -122,7 +122,7 @@ std::uint64_t thermal_hash(const scene::ThermalOptions& o) {
 /// Hash of the sensor's format, field of view and trajectory.
 std::uint64_t camera_hash(const scene::SensorDesc& sensor) {
   Fnv64 hash;
-  add(hash, sensor.width_px, sensor.height_px, sensor.fov_h_rad);
+  add(hash, sensor.width_px, sensor.height_px, sensor.fov_h_rad, sensor.narrowest_fov_rad());
   add_keys(hash, sensor.trajectory);
   return hash.value();
 }

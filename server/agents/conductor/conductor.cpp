@@ -67,6 +67,8 @@ void Conductor::start_run(std::int64_t now_ns) noexcept {
   prediction_.clear();
   entities_.clear();
   input_ = {};
+  fov_h_rad_ = options_.fov_h_rad;
+  body_from_detector_ = glm::dquat(1.0, 0.0, 0.0, 0.0);
   last_sim_time_ns_ = 0;
   issued_any_ = false;
   slot_policy_.reset();
@@ -163,13 +165,13 @@ void Conductor::place_at_slot(RenderJob& job, FrameLedger::Issued& issued) noexc
 
 void Conductor::issue(RenderJob& job, FrameLedger::Issued& issued, bool is_step) noexcept {
   job.channels = due_channels(context_.channels, ledger_.next_number());
-  job.request.window_px = window_around(context_.channels, job.channels);
   job.request.thermal_time_ns = control_.thermal_time_ns(job.request.sim_time_ns, is_step);
   if (motion_) {
     const std::int64_t begin_ns =
         slots_ ? issued.header.slot_begin_ns : issued.header.host_received_ns;
     motion_->place(job, issued, begin_ns + options_.pacing.display_delay_ns);
   }
+  place_cameras(job, issued.motion.attitude.world_from_rendered);
   // A frame before the first pose holds no later frame back.
   if (input_.came) {
     last_sim_time_ns_ = job.request.sim_time_ns;
@@ -261,9 +263,7 @@ bool Conductor::publish_image(const RenderDone& done, std::int64_t now_ns) noexc
   if (motion_) {
     motion_->finish(issued, done);
   }
-  ledger_.fill_image(*frame, done,
-                     late_for_slot || (has_deadline && is_past_deadline(issued.header.deadline_ns,
-                                                                        done.readback_end_ns)));
+  ledger_.fill_image(*frame, done, late_for_slot, has_deadline);
   hand_over(ledger_.shown());
   record_times(ledger_.shown());
   if (options_.gateway) {

@@ -32,6 +32,8 @@ class Conductor final : public Agent {
     bool canned = false;                 ///< frames carry kFlagCanned
     const MotionPlan* motion = nullptr;  ///< the motion simulator, where there is one
     std::int64_t first_time_ns = 0;      ///< simulation time that is shown before the first pose
+    double fov_h_rad = 0.0;              ///< field of view at the start of a run; 0: not known
+    double fov_h_min_rad = 0.0;          ///< narrowest that a host may set; the widest is fov_h_rad
     bool gateway = false;  ///< host frames come from the gateway, and those of others are refused
   };
   /// @param triggers  where pacing mode trigger reads its triggers, on the agent's thread; that
@@ -64,6 +66,8 @@ class Conductor final : public Agent {
   void store_weather(const protocol::EnvironmentData& environment,
                      std::int64_t sim_time_ns) noexcept;
   void drop_unknown_entities(HostInput& input) noexcept;
+  /// Leaves out a field of view that the sensor cannot have, and answers it.
+  void drop_wrong_view(HostInput& input) noexcept;
   void refuse(const Origin& origin, StatusCode code, std::uint64_t host_frame_number,
               std::uint64_t detail = 0) noexcept;
   void reply(const Origin& origin, StatusCode code, std::uint64_t host_frame_number,
@@ -89,6 +93,12 @@ class Conductor final : public Agent {
   /// Places sensor and entities where they are at the instant that the slot shows.
   void place_at_slot(RenderJob& job, FrameLedger::Issued& issued) noexcept;
   void issue(RenderJob& job, FrameLedger::Issued& issued, bool is_step) noexcept;
+  /// Places the cameras whose channels show the frame (conductor_cameras.cpp). The pose of the
+  /// request, the seeker's, becomes that of the first of them.
+  void place_cameras(RenderJob& job, const glm::dmat3& world_from_projector) const noexcept;
+  /// Returns what carries a camera.
+  [[nodiscard]] physics::Pose carrier_of(const Camera& camera, const RenderJob& job,
+                                         const glm::dmat3& world_from_projector) const noexcept;
   void begin_slot() noexcept;
   bool end_slot(std::int64_t now_ns) noexcept;
   [[nodiscard]] bool can_issue() noexcept;
@@ -123,6 +133,8 @@ class Conductor final : public Agent {
     bool came = false;  ///< false: the run has had none
   };
   NewestInput input_;
+  glm::dquat body_from_detector_{1.0, 0.0, 0.0, 0.0};  // gimbals of the seeker, by the host
+  double fov_h_rad_ = 0.0;             // of the frames to come, as the host has set it
   std::int64_t last_sim_time_ns_ = 0;  // of the newest frame issued in this run
   bool issued_any_ = false;
   std::array<scene::WeatherSample, kMaxWeatherPerFrame> weather_;  // goes with the next frame

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "agents/conductor/conductor.hpp"
+#include "agents/conductor/turn.hpp"
 
 namespace emit::server {
 
@@ -82,6 +83,7 @@ bool Conductor::take_frame(HostInput& input, std::int64_t now_ns) noexcept {
   }
   gate_.accept(frame);
   drop_unknown_entities(input);
+  drop_wrong_view(input);
   context_.counters.add(Counter::host_frames_accepted);
   if (gate.missing > 0) {
     context_.counters.add(Counter::host_frames_missing, gate.missing);
@@ -121,6 +123,8 @@ void Conductor::store(const HostFrameData& frame) noexcept {
       motion_->take_pose(frame);
     }
   }
+  if (frame.fov_h_rad) fov_h_rad_ = *frame.fov_h_rad;
+  if (frame.gimbal_rad) body_from_detector_ = turn_of(*frame.gimbal_rad);
   if (frame.environment) {
     store_weather(*frame.environment, frame.sim_time_ns);
   }
@@ -163,6 +167,17 @@ void Conductor::drop_unknown_entities(HostInput& input) noexcept {
     ++kept;
   }
   frame.entity_count = kept;
+}
+
+void Conductor::drop_wrong_view(HostInput& input) noexcept {
+  std::optional<double>& fov_h_rad = input.frame.fov_h_rad;
+  constexpr double kSlackFrac = 1e-6;  // hosts round
+  if (!fov_h_rad || (*fov_h_rad >= (1.0 - kSlackFrac) * options_.fov_h_min_rad &&
+                     *fov_h_rad <= (1.0 + kSlackFrac) * options_.fov_h_rad)) {
+    return;
+  }
+  fov_h_rad.reset();
+  refuse(input.origin, StatusCode::invalid_view, input.frame.frame_number);
 }
 
 bool Conductor::take_command(const HostInput& input, std::int64_t now_ns) noexcept {
@@ -231,8 +246,9 @@ void Conductor::reply(const Origin& origin, StatusCode code, std::uint64_t host_
 
 void Conductor::report_input(StatusCode code, std::uint64_t host_frame_number,
                              std::uint64_t detail) noexcept {
-  // Entities that are refused do not keep the image from coming.
-  if (code == StatusCode::unknown_entity || code == StatusCode::overloaded) {
+  // Entities and views that are refused do not keep the image from coming.
+  if (code == StatusCode::unknown_entity || code == StatusCode::overloaded ||
+      code == StatusCode::invalid_view) {
     return;
   }
   const bool unused = code == StatusCode::ok && detail == protocol::kDetailStopped;

@@ -28,6 +28,8 @@ void ConductorJournal::host_frame(const protocol::HostFrameData& frame,
   line.seeker = frame.seeker;
   line.seeker_rates = frame.seeker_rates;
   line.environment = frame.environment;
+  line.fov_h_rad = frame.fov_h_rad;
+  line.gimbal_rad = frame.gimbal_rad;
   line.entity_count = frame.entity_count;
   written(writer_.write(line, frame.entity_span()));
 }
@@ -43,6 +45,7 @@ void ConductorJournal::frame(const protocol::FrameHeader& header, const Shown& s
   line.pose_sim_time_ns = header.pose_sim_time_ns;
   line.thermal_time_ns = shown.thermal_time_ns;
   line.sensor_pose = header.pose;
+  line.fov_h_rad = shown.fov_h_rad;
   line.flags = header.flags;
   line.quality_rung = header.quality_rung;
   line.radiance_crc32c = shown.crc32c;
@@ -51,6 +54,8 @@ void ConductorJournal::frame(const protocol::FrameHeader& header, const Shown& s
   line.trigger_number = header.trigger_number;
   line.slot_begin_ns = header.slot_begin_ns;
   line.shift_px = shown.shift_px;
+  line.more_shot_count = rendered ? shown.more_shot_count : 0;
+  line.more_shots = shown.more_shots;
   line.entity_count = static_cast<std::uint32_t>(entities.size());
   written(writer_.write(line, entities));
 }

@@ -105,6 +105,16 @@ void EntityBook::add_update(RenderJob& job, Entity& entity, const physics::Pose&
   }
 }
 
+physics::Pose EntityBook::pose_of(std::uint32_t id, std::int64_t sim_time_ns,
+                                  bool placed) const noexcept {
+  const auto found = std::lower_bound(entities_.begin(), entities_.end(), id,
+                                      [](const Entity& a, std::uint32_t b) { return a.id < b; });
+  if (found == entities_.end() || found->id != id || found->track.empty()) {
+    return scenario_.entity_at(id, sim_time_ns).pose;
+  }
+  return placed ? found->placed.pose : found->track.newest().pose;
+}
+
 bool EntityBook::add_marked(RenderJob& job) noexcept {
   std::size_t applied = 0;
   for (; applied < marked_.size() && job.entity_count < job.entities.size(); ++applied) {

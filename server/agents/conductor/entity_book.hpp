@@ -29,6 +29,12 @@ class EntityBook {
   /// @param mark  also lists the entity for add_marked(), where frames belong to poses
   void store(const protocol::EntityStateData& state, std::int64_t sim_time_ns, bool mark) noexcept;
 
+  /// Returns where an entity is in the frame that is made up at `sim_time_ns`. Without a pose of a
+  /// host the scenario says it.
+  /// @param placed  add_all_at() has placed the entities; otherwise the newest pose counts
+  [[nodiscard]] physics::Pose pose_of(std::uint32_t id, std::int64_t sim_time_ns,
+                                      bool placed) const noexcept;
+
   /// Adds the newest pose of every marked entity to the job, oldest mark first. Returns false when
   /// some had no room; they are still marked.
   [[nodiscard]] bool add_marked(RenderJob& job) noexcept;

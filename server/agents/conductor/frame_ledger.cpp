@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "emit/physics/check.hpp"
+#include "pacing/deadline_policy.hpp"
 
 namespace emit::server {
 
@@ -29,11 +30,15 @@ FrameLedger::Issued& FrameLedger::next() noexcept {
 
 void FrameLedger::issue(RenderJob& job, Issued& issued) noexcept {
   EMIT_DCHECK(!full());
-  job.request.frame_number = ++render_number_;
+  job.request.frame_number = render_number_ + 1;
+  render_number_ += static_cast<std::uint64_t>(
+      std::ranges::count_if(job.shots, [](const CameraShot& shot) { return shot.due; }));
   job.deadline_ns = issued.header.deadline_ns;
   issued.header.run_id = run_id_;
   issued.header.sim_time_ns = job.request.sim_time_ns;
   issued.header.pose = job.request.sensor_pose;
+  issued.header.fov_h_rad = static_cast<float>(job.request.fov_h_rad);
+  issued.fov_h_rad = job.request.fov_h_rad;
   issued.thermal_time_ns = job.request.thermal_time_ns;
   issued.entity_count = job.entity_count;
   std::copy_n(job.entities.begin(), job.entity_count, issued.entities.begin());
@@ -51,8 +56,14 @@ void FrameLedger::pop_oldest() noexcept {
   --in_work_;
 }
 
-void FrameLedger::fill_image(PublishFrame& out, const RenderDone& done, bool late) noexcept {
+void FrameLedger::fill_image(PublishFrame& out, const RenderDone& done, bool late_for_slot,
+                             bool has_deadline) noexcept {
   const Issued& issued = oldest();
+  const auto late_flag = [&](std::int64_t ready_ns) {
+    const bool late =
+        late_for_slot || (has_deadline && is_past_deadline(issued.header.deadline_ns, ready_ns));
+    return late ? std::uint32_t{protocol::kFlagLate} : 0U;
+  };
   out.repeat = false;
   out.image = done.image;
   FrameHeader& header = out.header;
@@ -65,38 +76,64 @@ void FrameLedger::fill_image(PublishFrame& out, const RenderDone& done, bool lat
   header.clamped_px = done.clamped_px;
   header.flags |= (done.nonfinite_px > 0 ? protocol::kFlagNonFinite : 0U) |
                   (done.clamped_px > 0 ? protocol::kFlagClamped : 0U) |
-                  (late ? protocol::kFlagLate : 0U);
-  note_quality(header, issued, done);
+                  late_flag(done.readback_end_ns);
+  const bool unknown_error = done.dropped_poses > 0 || done.warmed_up || issued.entities_behind;
+  note_quality(header, {done.quality_level, done.estimated_error_k, unknown_error || done.coarse,
+                        done.device_failed});
+  if (header.quality_rung > 0) context_.counters.add(Counter::frames_shed);
+  if (issued.entities_behind) context_.counters.add(Counter::frames_entities_behind);
+  for (CameraImage& camera : out.image.cameras) {
+    if (!camera.shown || done.image.camera_count == 1) continue;
+    FrameHeader own;
+    own.flags = (camera.nonfinite_px > 0 ? protocol::kFlagNonFinite : 0U) |
+                (camera.clamped_px > 0 ? protocol::kFlagClamped : 0U) |
+                late_flag(camera.readback_end_ns);
+    note_quality(own, {camera.quality_level, camera.estimated_error_k,
+                       unknown_error || camera.coarse, done.device_failed});
+    camera.flags = own.flags & kCameraFlags;
+    camera.estimated_error_k = own.estimated_error_k;
+  }
   shown_ = header;
   shown_for_journal_.thermal_time_ns = issued.thermal_time_ns;
+  shown_for_journal_.fov_h_rad = issued.fov_h_rad;
   shown_for_journal_.shift_px = done.image.shift_px;
-  for (const Channel& channel : context_.channels) {
-    if ((done.image.channels >> channel.index & 1U) != 0) {
-      shown_for_journal_.channel = channel.index;
-      shown_for_journal_.crc32c = done.image.crc32c[channel.picture];
-      break;
+  note_shots(done.image);
+}
+
+void FrameLedger::note_shots(const Image& image) noexcept {
+  shown_for_journal_.more_shot_count = 0;
+  bool first = true;
+  for (std::size_t i = 0; i < image.camera_count; ++i) {
+    const CameraImage& camera = image.cameras[i];
+    const auto channel = std::ranges::find_if(context_.channels, [&](const Channel& one) {
+      return one.camera == i && (image.channels >> one.index & 1U) != 0;
+    });
+    if (!camera.shown || channel == context_.channels.end()) continue;
+    const JournalShot shot{camera.pose, camera.fov_h_rad, channel->index,
+                           image.crc32c[channel->picture]};
+    if (first) {
+      shown_for_journal_.channel = shot.channel;
+      shown_for_journal_.crc32c = shot.crc32c;
+      first = false;
+    } else {
+      shown_for_journal_.more_shots[shown_for_journal_.more_shot_count++] = shot;
     }
   }
 }
 
-void FrameLedger::note_quality(FrameHeader& header, const Issued& issued,
-                               const RenderDone& done) noexcept {
-  if (done.quality_level > 0) {
+void FrameLedger::note_quality(FrameHeader& header, const Quality& quality) noexcept {
+  if (quality.level > 0) {
     header.flags |= protocol::kFlagDegraded;
-    header.quality_rung = done.quality_level;
-    header.estimated_error_k = done.estimated_error_k;
-    context_.counters.add(Counter::frames_shed);
+    header.quality_rung = quality.level;
+    header.estimated_error_k = quality.estimated_error_k;
   }
-  if (issued.entities_behind) {
-    context_.counters.add(Counter::frames_entities_behind);
-  }
-  if (done.dropped_poses > 0 || done.coarse || done.warmed_up || issued.entities_behind) {
+  if (quality.unknown_error) {
     // The error is unknown when the past or the surface is coarser, or when an entity stands where
     // it was a frame ago: it depends on the places that the entity shaded.
     header.flags |= protocol::kFlagDegraded;
     header.estimated_error_k = std::numeric_limits<float>::quiet_NaN();
   }
-  if (done.device_failed) {
+  if (quality.device_failed) {
     header.flags |= protocol::kFlagDegraded;
     header.estimated_error_k = std::numeric_limits<float>::infinity();
   }

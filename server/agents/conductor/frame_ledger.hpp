@@ -20,6 +20,7 @@ class FrameLedger {
   struct Issued {
     protocol::FrameHeader header;
     std::int64_t thermal_time_ns = 0;
+    double fov_h_rad = 0.0;
     bool entities_behind = false;  ///< more entities moved than a frame takes
     /// Attitudes of a frame with a motion simulator, and what was wrong when it was issued.
     struct Motion {
@@ -54,9 +55,11 @@ class FrameLedger {
   /// @pre !idle()
   [[nodiscard]] Issued& oldest() noexcept;
 
-  /// Writes the frame of oldest() with its image, and keeps it for repetition.
+  /// Writes the frame of oldest() with its image, and keeps it for repetition. Each camera has
+  /// flags of its own.
   /// @pre !idle()
-  void fill_image(PublishFrame& out, const RenderDone& done, bool late) noexcept;
+  void fill_image(PublishFrame& out, const RenderDone& done, bool late_for_slot,
+                  bool has_deadline) noexcept;
   /// Removes the frame of oldest(), which is published.
   /// @pre !idle()
   void pop_oldest() noexcept;
@@ -71,9 +74,17 @@ class FrameLedger {
   }
 
  private:
+  /// Quality of an image or of a frame.
+  struct Quality {
+    std::uint8_t level = 0;
+    float estimated_error_k = 0.0F;
+    bool unknown_error = false;
+    bool device_failed = false;
+  };
   /// Writes the flags and the estimated error of a frame that has less than full quality.
-  void note_quality(protocol::FrameHeader& header, const Issued& issued,
-                    const RenderDone& done) noexcept;
+  static void note_quality(protocol::FrameHeader& header, const Quality& quality) noexcept;
+  /// Keeps what the cameras of an image showed for the journal.
+  void note_shots(const Image& image) noexcept;
 
   Context& context_;
   std::uint64_t run_id_ = 0;

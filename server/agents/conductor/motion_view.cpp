@@ -134,8 +134,6 @@ void MotionView::place(RenderJob& job, FrameLedger::Issued& issued,
     issued.header.display_ns = display_ns;
     attitude.world_from_rendered = plan_.follower.table.world_from_projector(
         attitude.world_from_seeker, angles_at(display_ns, known));
-    job.request.sensor_pose.world_from_body =
-        glm::normalize(glm::quat_cast(attitude.world_from_rendered));
   }
   job.attitude = attitude;
   job.display_ns = display_ns;

@@ -36,7 +36,7 @@ class MotionView {
   /// @return the number of reports taken
   int take_reports() noexcept;
 
-  /// Turns the camera of a frame that is shown at `display_ns`, wall.
+  /// Finds the attitudes of a frame that is shown at `display_ns`, wall.
   void place(RenderJob& job, FrameLedger::Issued& issued, std::int64_t display_ns) noexcept;
   /// Writes state and shift into the header of a finished frame. Where pictures shift, it is the
   /// shift that they were moved by.

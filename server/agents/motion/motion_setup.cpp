@@ -57,6 +57,23 @@ std::optional<TwoAxisGimbal> target_of(config::TargetRings rings) {
   return std::nullopt;
 }
 
+/// Errors (config): the projector channels are not all of one view along the projector.
+physics::Result<void> check_projectors(const scene::ScenarioDesc& scenario,
+                                       const scene::ChannelDesc& first) {
+  scene::ChannelCamera along;
+  along.fov_h_rad = first.camera.fov_h_rad;
+  for (const scene::ChannelDesc& channel : scenario.channels) {
+    if (channel.kind != scene::ChannelKind::projector || channel.camera == along) continue;
+    return make_error(
+        ErrorCode::config,
+        fmt::format("{}: channel '{}': with [motion] projector channels look along the "
+                    "projector, all with one field of view: 'fov_h_deg' alone may be "
+                    "set, alike for all",
+                    scenario.file.string(), channel.name));
+  }
+  return {};
+}
+
 }  // namespace
 
 physics::Result<MotionPlan> make_motion_plan(const config::DaemonConfig& config,
@@ -69,11 +86,6 @@ physics::Result<MotionPlan> make_motion_plan(const config::DaemonConfig& config,
     return channel.kind == scene::ChannelKind::projector;
   };
   const bool projects = std::ranges::any_of(channels, is_projector);
-  if (projects && !std::ranges::all_of(channels, is_projector)) {
-    return make_error(ErrorCode::config,
-                      "[motion]: the scenario has injection and projector channels, which look in "
-                      "different directions; serve them by two daemons");
-  }
   if (projects && !scenario) {
     return make_error(ErrorCode::config, "[motion]: a projector channel needs a scenario");
   }
@@ -102,7 +114,18 @@ physics::Result<MotionPlan> make_motion_plan(const config::DaemonConfig& config,
   plan.follower.horizon_ns = config.pacing.horizon_ns;
   if (scenario) {
     plan.size_px = {scenario->sensor.width_px, scenario->sensor.height_px};
-    plan.focal_px = 0.5 * plan.size_px.x / std::tan(0.5 * scenario->sensor.fov_h_rad);
+    double fov_h_rad = scenario->sensor.fov_h_rad;
+    const auto projecting =
+        std::ranges::find_if(scenario->channels, [](const scene::ChannelDesc& channel) {
+          return channel.kind == scene::ChannelKind::projector;
+        });
+    if (projecting != scenario->channels.end()) {
+      if (auto checked = check_projectors(*scenario, *projecting); !checked) {
+        return tl::unexpected<physics::Error>(std::move(checked.error()));
+      }
+      if (projecting->camera.fov_h_rad > 0.0) fov_h_rad = projecting->camera.fov_h_rad;
+    }
+    plan.focal_px = 0.5 * plan.size_px.x / std::tan(0.5 * fov_h_rad);
   }
   return plan;
 }

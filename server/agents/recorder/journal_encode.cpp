@@ -49,6 +49,8 @@ bool host_frame(std::span<const std::byte> bytes, v1::HostFrame& out) {
   frame.seeker = line.seeker;
   frame.seeker_rates = line.seeker_rates;
   frame.environment = line.environment;
+  frame.fov_h_rad = line.fov_h_rad;
+  frame.gimbal_rad = line.gimbal_rad;
   frame.entity_count = line.entity_count;
   protocol::to_proto(frame, out);
   return true;
@@ -67,6 +69,7 @@ bool decision(std::span<const std::byte> bytes, v1::FrameDecision& out) {
   out.set_pose_sim_time_ns(line.pose_sim_time_ns);
   out.set_thermal_time_ns(line.thermal_time_ns);
   protocol::to_proto(line.sensor_pose, std::nullopt, *out.mutable_sensor_pose());
+  out.set_fov_h_rad(line.fov_h_rad);
   out.set_flags(line.flags);
   out.set_quality_rung(line.quality_rung);
   out.set_radiance_crc32c(line.radiance_crc32c);
@@ -76,6 +79,17 @@ bool decision(std::span<const std::byte> bytes, v1::FrameDecision& out) {
   out.set_slot_begin_ns(line.slot_begin_ns);
   out.set_applied_shift_x_px(line.shift_px.x);
   out.set_applied_shift_y_px(line.shift_px.y);
+  if (line.more_shot_count > line.more_shots.size()) {
+    return false;
+  }
+  for (std::uint32_t i = 0; i < line.more_shot_count; ++i) {
+    const JournalShot& shot = line.more_shots[i];
+    v1::CameraDecision& camera = *out.add_more_cameras();
+    protocol::to_proto(shot.pose, std::nullopt, *camera.mutable_sensor_pose());
+    camera.set_fov_h_rad(shot.fov_h_rad);
+    camera.set_radiance_crc32c(shot.crc32c);
+    camera.set_radiance_channel(shot.channel);
+  }
   for (std::uint32_t i = 0; i < line.entity_count; ++i) {
     protocol::EntityStateData state;
     state.entity_id = entities[i].entity_id;

@@ -22,11 +22,15 @@ bool RenderAgent::on_start() noexcept {
 
 void RenderAgent::on_stop() noexcept {
   while (count_ > 0) {
-    const auto slot = in_flight_[first_].slot;
-    if (!lost_) {  // a device that is gone might be waited for for ever
-      static_cast<void>(source_->collect(slot));
+    for (const CameraImage& camera : in_flight_[first_].cameras) {
+      if (!camera.shown) {
+        continue;
+      }
+      if (!lost_) {  // a device that is gone might be waited for for ever
+        static_cast<void>(source_->collect(camera.slot));
+      }
+      source_->release(camera.slot);
     }
-    source_->release(slot);
     first_ = (first_ + 1) % kDepth;
     --count_;
   }
@@ -71,20 +75,21 @@ bool RenderAgent::take_job() noexcept {
       if (count_ == kDepth) {
         return false;
       }
-      const std::int64_t begun_ns = context_.clock.monotonic_ns();
+      InFlight& next = in_flight_[(first_ + count_) % kDepth];
       if (!job_prepared_) {
         apply_weather(*job);
         source_->apply_entities(job->request.sim_time_ns,
                                 std::span(job->entities.data(), job->entity_count));
+        next = {};
+        next.begun_ns = context_.clock.monotonic_ns();
+        // The job may have come after this turn began.
+        next.render_start_ns = context_.clock.tai_ns();
+        next.attitude = job->attitude;
+        next.display_ns = job->display_ns;
+        next.channels = job->channels;
         job_prepared_ = true;
       }
-      // The job may have come after this turn began.
-      const std::int64_t submitted_ns = context_.clock.tai_ns();
-      const double expected_ms = choose_quality_level(*job, submitted_ns);
-
-      bool warmed_up = false;
-      const auto slot = context_.of_slots.look([&] { return submit(job->request, warmed_up); });
-      if (!slot) {
+      if (!submit_shots(*job)) {
         // The agent that releases a slot rings the doorbell.
         if (!starved_) {
           context_.counters.add(Counter::no_free_slot);
@@ -94,15 +99,48 @@ bool RenderAgent::take_job() noexcept {
       }
       starved_ = false;
       job_prepared_ = false;
-      in_flight_[(first_ + count_) % kDepth] = {*slot,         job->attitude, job->display_ns,
-                                                submitted_ns,  expected_ms,   begun_ns,
-                                                job->channels, warmed_up};
       ++count_;
       context_.counters.add(Counter::frames_submitted);
       break;
     }
   }
   context_.jobs.pop();
+  return true;
+}
+
+bool RenderAgent::submit_shots(RenderJob& job) noexcept {
+  InFlight& frame = in_flight_[(first_ + count_) % kDepth];
+  const auto due = static_cast<std::size_t>(
+      std::ranges::count_if(job.shots, [](const CameraShot& shot) { return shot.due; }));
+  for (std::size_t i = 0; i < job.shots.size(); ++i) {
+    const CameraShot& shot = job.shots[i];
+    CameraImage& image = frame.cameras[i];
+    if (!shot.due || image.shown) {
+      continue;
+    }
+    renderer::FrameRequest request = job.request;
+    request.frame_number += frame.shots;
+    request.sensor_pose = shot.pose;
+    request.fov_h_rad = shot.fov_h_rad;
+    request.window_px = shot.window_px;
+    // One quality level holds for all images of a frame, which share the time that is left.
+    if (frame.shots == 0) {
+      frame.quality_level = choose_quality_level(job, request, context_.clock.tai_ns(), due);
+    }
+    request.quality_level = frame.quality_level;
+    const auto slot = context_.of_slots.look([&] { return submit(request, frame.warmed_up); });
+    if (!slot) {
+      return false;
+    }
+    if (job.deadline_ns != 0) {
+      frame.expected_ms += source_->expected_levels(request)[frame.quality_level].frame_ms;
+    }
+    ++frame.shots;
+    image.shown = true;
+    image.slot = *slot;
+    image.pose = shot.pose;
+    image.fov_h_rad = shot.fov_h_rad;
+  }
   return true;
 }
 
@@ -136,15 +174,14 @@ std::optional<renderer::SlotIndex> RenderAgent::submit(const renderer::FrameRequ
   return static_cast<renderer::SlotIndex>(slot);
 }
 
-double RenderAgent::choose_quality_level(RenderJob& job, std::int64_t now_ns) noexcept {
-  job.request.quality_level = 0;
+std::uint8_t RenderAgent::choose_quality_level(const RenderJob& job,
+                                               const renderer::FrameRequest& first,
+                                               std::int64_t now_ns, std::size_t shots) noexcept {
   if (job.deadline_ns == 0) {
-    return 0.0;
+    return 0;
   }
-  const auto quality_levels = source_->expected_levels(job.request);
-  const std::size_t quality_level = quality_.choose(quality_levels, job.deadline_ns - now_ns);
-  job.request.quality_level = static_cast<std::uint8_t>(quality_level);
-  return quality_levels[quality_level].frame_ms;
+  const std::int64_t time_left_ns = (job.deadline_ns - now_ns) / static_cast<std::int64_t>(shots);
+  return static_cast<std::uint8_t>(quality_.choose(source_->expected_levels(first), time_left_ns));
 }
 
 void RenderAgent::apply_weather(const RenderJob& job) noexcept {
@@ -197,46 +234,85 @@ bool RenderAgent::finish_oldest() noexcept {
   if (count_ == 0) {
     return false;
   }
-  const InFlight& oldest = in_flight_[first_];
-  if (!source_->poll(oldest.slot)) {
+  InFlight& oldest = in_flight_[first_];
+  // The device works on the images in the order of their submission.
+  std::size_t camera = 0;
+  for (std::size_t shots = 0; shots < oldest.collected || !oldest.cameras[camera].shown; ++camera) {
+    shots += oldest.cameras[camera].shown ? 1U : 0U;
+  }
+  if (!source_->poll(oldest.cameras[camera].slot)) {
     return false;
   }
   RenderDone* done = context_.done.claim();
   if (done == nullptr) {
     return false;
   }
-  done->render_start_ns = oldest.render_start_ns;
-  done->render_end_ns = context_.clock.tai_ns();
-  const renderer::FrameView& view = source_->collect(oldest.slot);
-  done->readback_end_ns = context_.clock.tai_ns();
-  done->nonfinite_px = view.stats.nonfinite_px;
-  done->clamped_px = view.stats.clamped_px;
-  done->dropped_poses = view.stats.dropped_poses;
-  note_dropped_poses(view.stats.dropped_poses);
-  done->coarse = view.stats.coarse;
-  if (view.stats.coarse) {
-    context_.counters.add(Counter::frames_coarse);
+  if (oldest.collected == 0) {
+    begin_done(oldest, oldest.cameras[camera].slot, *done);
   }
-  done->quality_level = view.quality_level;
-  done->estimated_error_k = view.estimated_error_k;
+  finish_shot(oldest, camera, *done);
+  if (++oldest.collected < oldest.shots) {
+    return true;
+  }
+  done->image.cameras = oldest.cameras;
+  done->image.camera_count = context_.cameras.size();
   done->warmed_up = oldest.warmed_up;
   // Neither a wall clock that is set nor a warm-up must be taken for a slow device.
   if (!oldest.warmed_up) {
     quality_.finished(context_.clock.monotonic_ns() - oldest.begun_ns, oldest.expected_ms);
   }
-  done->device_failed = view.device_failed;
-  note_device(view);
-  done->image.source = source_.get();
-  done->image.slot = oldest.slot;
-  done->image.channels = oldest.channels;
-  find_shift(oldest, *done);
-  take_pictures(view, done->image);
   context_.done.commit();
   context_.counters.add(Counter::frames_rendered);
   first_ = (first_ + 1) % kDepth;
   --count_;
   context_.bells.conductor.ring();
   return true;
+}
+
+void RenderAgent::begin_done(const InFlight& frame, renderer::SlotIndex slot,
+                             RenderDone& done) noexcept {
+  done.render_start_ns = frame.render_start_ns;
+  done.nonfinite_px = done.clamped_px = 0;
+  done.dropped_poses = 0;
+  done.coarse = done.device_failed = false;
+  done.quality_level = 0;
+  done.estimated_error_k = 0.0F;
+  done.image.source = source_.get();
+  done.image.slot = slot;
+  done.image.channels = frame.channels;
+  done.image.pictures = {};
+}
+
+void RenderAgent::finish_shot(InFlight& frame, std::size_t camera, RenderDone& done) noexcept {
+  CameraImage& image = frame.cameras[camera];
+  done.render_end_ns = context_.clock.tai_ns();
+  const renderer::FrameView& view = source_->collect(image.slot);
+  done.readback_end_ns = context_.clock.tai_ns();
+  image.readback_end_ns = done.readback_end_ns;
+  image.nonfinite_px = view.stats.nonfinite_px;
+  image.clamped_px = view.stats.clamped_px;
+  image.coarse = view.stats.coarse;
+  done.nonfinite_px += view.stats.nonfinite_px;
+  done.clamped_px += view.stats.clamped_px;
+  done.dropped_poses = view.stats.dropped_poses;
+  note_dropped_poses(view.stats.dropped_poses);
+  if (view.stats.coarse) {
+    done.coarse = true;
+    context_.counters.add(Counter::frames_coarse);
+  }
+  // The level of the image that lost most stands for the frame.
+  if (view.quality_level >= done.quality_level) {
+    done.quality_level = view.quality_level;
+    done.estimated_error_k = view.estimated_error_k;
+  }
+  image.quality_level = view.quality_level;
+  image.estimated_error_k = view.estimated_error_k;
+  done.device_failed = done.device_failed || view.device_failed;
+  note_device(view);
+  if (frame.collected == 0) {
+    find_shift(frame, done);
+  }
+  take_pictures(camera, view, image.slot, done.image);
 }
 
 void RenderAgent::take_feedback() noexcept {
@@ -259,14 +335,14 @@ void RenderAgent::find_shift(const InFlight& frame, RenderDone& done) noexcept {
   context_.counters.add(Counter::output_shifts_unknown);
 }
 
-void RenderAgent::take_pictures(const renderer::FrameView& view, Image& image) noexcept {
+void RenderAgent::take_pictures(std::size_t camera, const renderer::FrameView& view,
+                                renderer::SlotIndex slot, Image& image) noexcept {
   const std::span<Picture> pictures(context_.pictures);
   for (std::size_t i = 0; i < pictures.size(); ++i) {
-    if ((pictures[i].channels & image.channels) == 0) {
-      image.pictures[i] = {};
+    if (pictures[i].camera != camera || (pictures[i].channels & image.channels) == 0) {
       continue;
     }
-    const TakenPicture taken = take_picture(pictures[i], view, image.slot, image.shift_px);
+    const TakenPicture taken = take_picture(pictures[i], view, slot, image.shift_px);
     image.pictures[i] = taken.pixels;
     image.clamped_px[i] = taken.clamped_px;
     context_.counters.add(Counter::output_px_clamped, taken.clamped_px);

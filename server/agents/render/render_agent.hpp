@@ -44,7 +44,11 @@ class RenderAgent final : public Agent {
 
  private:
   struct InFlight {
-    renderer::SlotIndex slot = 0;
+    /// Images by camera; those with a slot have `shown`.
+    std::array<CameraImage, kMaxCameras> cameras;
+    std::size_t shots = 0;      ///< images that were submitted
+    std::size_t collected = 0;  ///< of them
+    std::uint8_t quality_level = 0;
     ShownAttitude attitude;
     std::int64_t display_ns = 0;
     std::int64_t render_start_ns = 0;
@@ -62,19 +66,29 @@ class RenderAgent final : public Agent {
   static constexpr std::int64_t kLongestFrameNs = 60'000'000'000;
 
   bool take_job() noexcept;
-  /// Hands a frame to the source; no slot: every slot is in use. `warmed_up` becomes true where the
-  /// surface warmed up again, which is then counted and logged.
+  /// Submits the shots of the job in front that are not submitted yet. Returns false where a slot
+  /// is lacking.
+  [[nodiscard]] bool submit_shots(RenderJob& job) noexcept;
+  /// Hands an image to the source; no slot: every slot is in use. `warmed_up` becomes true where
+  /// the surface warmed up again, which is then counted and logged.
   [[nodiscard]] std::optional<renderer::SlotIndex> submit(const renderer::FrameRequest& request,
                                                           bool& warmed_up) noexcept;
   bool finish_oldest() noexcept;
+  /// Begins the report of a frame whose first image is in `slot`.
+  void begin_done(const InFlight& frame, renderer::SlotIndex slot, RenderDone& done) noexcept;
+  /// Takes the pixels of one camera.
+  void finish_shot(InFlight& frame, std::size_t camera, RenderDone& done) noexcept;
   /// Takes what the axes of a motion simulator measured.
   void take_feedback() noexcept;
   /// Finds the shift of the frame by the newest measurements, where pictures shift.
   void find_shift(const InFlight& frame, RenderDone& done) noexcept;
-  /// Takes the images of image.channels, and their checksums.
-  void take_pictures(const renderer::FrameView& view, Image& image) noexcept;
-  /// Chooses the quality level of the job. Returns its QualityLevelStats::frame_ms.
-  double choose_quality_level(RenderJob& job, std::int64_t now_ns) noexcept;
+  /// Takes the pictures of one camera that image.channels show, and their checksums.
+  void take_pictures(std::size_t camera, const renderer::FrameView& view, renderer::SlotIndex slot,
+                     Image& image) noexcept;
+  /// Chooses the quality level of a frame of so many images, by the first one.
+  [[nodiscard]] std::uint8_t choose_quality_level(const RenderJob& job,
+                                                  const renderer::FrameRequest& first,
+                                                  std::int64_t now_ns, std::size_t shots) noexcept;
   void apply_weather(const RenderJob& job) noexcept;
   void note_dropped_poses(std::uint64_t in_run) noexcept;
   void note_device(const renderer::FrameView& view) noexcept;

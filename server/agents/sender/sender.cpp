@@ -223,7 +223,7 @@ void Sender::hold(const Image& image) noexcept {
 
 void Sender::let_go(const Image& image) noexcept {
   if (--holds_[image.slot] == 0) {
-    image.source->release(image.slot);
+    image.release();
     if (context_.of_slots.end()) {
       context_.bells.render.ring();
     }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "agents/sender/sender_client.hpp"
 
+#include <limits>
+
 #include <cstdlib>
 
 #include "emit/physics/check.hpp"
@@ -33,6 +35,26 @@ protocol::FrameHeader SenderClient::header_for(const Channel& channel,
   out.band_lo_um = static_cast<float>(channel.band_lo_um);
   out.band_hi_um = static_cast<float>(channel.band_hi_um);
   out.output_steps = channel.output_steps;
+  if (image.camera_count > 1) {
+    const CameraImage& camera = image.cameras[channel.camera];
+    out.pose = camera.pose;
+    out.fov_h_rad = static_cast<float>(camera.fov_h_rad);
+    out.nonfinite_px = camera.nonfinite_px;
+    out.clamped_px = camera.clamped_px;
+    out.estimated_error_k = camera.estimated_error_k;
+    out.readback_end_ns = camera.readback_end_ns;
+    out.flags = (out.flags & ~kCameraFlags) | camera.flags;
+    // A frame that is shown again is in time.
+    if ((out.flags & protocol::kFlagRepeated) != 0) {
+      out.flags &= ~std::uint32_t{protocol::kFlagLate};
+    }
+  }
+  if (channel.kind == scene::ChannelKind::injection && out.display_ns != 0) {
+    // The axes do not stand between this image and its detector.
+    out.shift_x_px = out.shift_y_px = 0.0F;
+    out.pointing_error_px = std::numeric_limits<float>::quiet_NaN();
+    out.display_ns = 0;
+  }
   // Pixels that do not lie as in the sensor's image have no window there.
   if ((channel.output_steps & protocol::kOutputMoved) == 0) {
     out.window_x_px = channel.window_px.x_px;

@@ -154,7 +154,11 @@ scene::ScenarioDesc plain_scenario(std::uint32_t width_px, std::uint32_t height_
   material.modes = {{609.0, 0.547}, {7259.0, 0.453}};
   scenario.materials = {material};
   scenario.default_material = "surface";
-  scenario.sensor = {"camera", width_px, height_px, 40.0 * physics::kDegree, 0.1, {}};
+  scenario.sensor.name = "camera";
+  scenario.sensor.width_px = width_px;
+  scenario.sensor.height_px = height_px;
+  scenario.sensor.fov_h_rad = 40.0 * physics::kDegree;
+  scenario.sensor.near_m = 0.1;
   scenario.thermal.method = scene::ThermalMethod::per_frame;
   scenario.thermal.steps = 9;
   scenario.thermal.shadow_map_px = 512;

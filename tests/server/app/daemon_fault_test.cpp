@@ -289,7 +289,7 @@ TEST_F(DaemonFaults, AUdpClientLearnsTheFragmentSizeThatItGets) {
   start_host_step();
   const std::string url = "udp://" + daemon_->control();
   for (const auto& [asked, granted] : std::vector<std::pair<std::uint32_t, std::uint32_t>>{
-           {1000, 1000}, {1441, 1440}, {10, 320}, {100'000, 65472}}) {
+           {1000, 1000}, {1441, 1440}, {10, 384}, {100'000, 65472}}) {
     client::SubscribeOptions options;
     options.fragment_payload_bytes = asked;
     const auto client = open(url, options);

@@ -37,11 +37,12 @@ FrameSourceFactory scripted(SourceScript& script) {
 
 /// A daemon in this process, on its own threads.
 struct LiveDaemon {
-  LiveDaemon(const config::DaemonConfig& config, SourceScript& script) {
+  LiveDaemon(const config::DaemonConfig& config, SourceScript& script,
+             const std::optional<scene::ScenarioDesc>& scenario = std::nullopt) {
     DaemonOptions options;
     options.source_factory = scripted(script);
     options.on_log = [](const std::string&) {};
-    auto created = Daemon::create(config, std::nullopt, options);
+    auto created = Daemon::create(config, scenario, options);
     EXPECT_TRUE(created.has_value()) << created.error().text;
     daemon = std::move(*created);
     url = "tcp://127.0.0.1:" + std::to_string(daemon->control_port());
@@ -261,6 +262,80 @@ INSTANTIATE_TEST_SUITE_P(Pacing, DaemonReplay,
                                   : parameter.param == config::PacingMode::ig_clock ? "IgClock"
                                                                                     : "Trigger";
                          });
+
+/// Cameras with fields of view, places and rates of their own, gimbals and a zoom: every image has
+/// the same bits again, and clients get the headers of their own camera.
+TEST(DaemonReplayOfCameras, EveryImageHasTheSameBits) {
+  ScratchFolder folder;
+  const std::string journal = folder.file("run.mcap");
+  scene::ScenarioDesc scenario;
+  scenario.name = "cameras";
+  scenario.bands = {{"8-12", 8.0, 12.0, {}}};
+  scenario.sensor.fov_h_rad = 0.5;
+  scenario.sensor.fov_h_min_rad = 0.1;
+  for (const char* name : {"seeker", "wide", "side"}) {
+    scenario.channels.push_back({name, scene::ChannelKind::injection, "8-12"});
+  }
+  scenario.channels[1].camera.fov_h_rad = 0.4;
+  scenario.channels[1].every_nth = 3;
+  scenario.channels[2].camera.offset_body_m = {0.0, 5.0, 0.0};
+  scenario.channels[2].window_px = {4, 2, 20, 10};
+  SourceScript live_script;
+  {
+    LiveDaemon live(configuration(config::PacingMode::host_step, journal), live_script, scenario);
+    auto host = client::HostClient::connect(live.url);
+    auto side = client::FrameClient::connect(live.url);
+    auto seeker = client::FrameClient::connect(live.url);
+    ASSERT_TRUE(host.has_value() && side.has_value() && seeker.has_value());
+    client::SubscribeOptions wanted;
+    wanted.channel_name = "side";
+    ASSERT_TRUE((*side)->subscribe(wanted).has_value());
+    wanted.channel_name = "seeker";
+    ASSERT_TRUE((*seeker)->subscribe(wanted).has_value());
+    for (std::uint64_t k = 1; k <= 20; ++k) {
+      protocol::HostFrameData frame;
+      frame.frame_number = k;
+      frame.run_id = 1;
+      frame.sim_time_ns = static_cast<std::int64_t>(k) * 5'000'000;
+      frame.seeker.position_world_m = {0.1 * static_cast<double>(k), -3.0, 200.0};
+      if (k % 4 == 0) frame.fov_h_rad = 0.5 / static_cast<double>(k / 4);
+      if (k % 5 == 0) frame.gimbal_rad = glm::dvec3(0.01 * static_cast<double>(k), 0.02, 0.03);
+      ASSERT_TRUE((*host)->send(frame).has_value());
+      const auto first = (*seeker)->receive(kLongNs);
+      const auto second = (*side)->receive(kLongNs);
+      ASSERT_TRUE(first.has_value() && *first != nullptr);
+      ASSERT_TRUE(second.has_value() && *second != nullptr);
+      const client::ReceivedFrame* of_seeker = *first;
+      const client::ReceivedFrame* of_side = *second;
+      const double zoom = k < 4 ? 0.5 : 0.5 / static_cast<double>(k / 4);
+      EXPECT_EQ(of_seeker->header.fov_h_rad, static_cast<float>(zoom)) << k;
+      EXPECT_EQ(of_side->header.fov_h_rad, static_cast<float>(zoom)) << k;
+      EXPECT_EQ(of_seeker->header.pose.position_world_m, frame.seeker.position_world_m);
+      EXPECT_NEAR(glm::length(of_side->header.pose.position_world_m -
+                              of_seeker->header.pose.position_world_m),
+                  5.0, 1e-12);
+      EXPECT_EQ(of_side->header.width_px, 20U);
+      EXPECT_NE(of_side->header.payload_crc32c, of_seeker->header.payload_crc32c);
+    }
+  }
+  SourceScript script;
+  ScriptedSource source(script, 32, 16, 7);
+  JournalPlayer player(source, *make_channels(scenario, source.info()));
+  auto log = protocol::LogReader::open(journal);
+  ASSERT_TRUE(log.has_value()) << log.error().text;
+  for (auto more = log->next(); more && *more; more = log->next()) {
+    const auto frame = player.apply(log->journal());
+    ASSERT_TRUE(frame.has_value()) << frame.error().text;
+  }
+  EXPECT_EQ(player.frames(), 20U);
+  EXPECT_EQ(player.mismatches(), 0U);
+  ASSERT_EQ(script.submitted.size(), 20U + 20U + 7U);
+  ASSERT_EQ(live_script.submitted.size(), script.submitted.size());
+  for (std::size_t i = 0; i < script.submitted.size(); ++i) {
+    EXPECT_EQ(script.submitted[i].fov_h_rad, live_script.submitted[i].fov_h_rad) << i;
+    EXPECT_EQ(script.submitted[i].frame_number, live_script.submitted[i].frame_number) << i;
+  }
+}
 
 /// The checksum of a frame is that of its first channel, with everything that is done to its
 /// picture, and the journal has the shift.

@@ -49,7 +49,7 @@ struct Stream {
     client::SubscribeOptions options;
     options.channel_name = name;
     options.every_nth = every_nth;
-    options.fragment_payload_bytes = 320;
+    options.fragment_payload_bytes = 384;
     return open(url, options);
   }
   void take() {

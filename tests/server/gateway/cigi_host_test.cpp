@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "emit/physics/constants.hpp"
 #include "gateway/cigi_host.hpp"
 #include "support/heap_counter.hpp"
 
@@ -118,6 +119,58 @@ TEST_F(CigiHostTest, WhatWaitsForNothingNeedsNoReport) {
   EXPECT_FALSE(next());
   now_ns_ += kFrameNs;
   EXPECT_TRUE(receive());
+}
+
+/// Every View Definition of both versions, with the field of view that it sets.
+TEST_F(CigiHostTest, ViewDefinitionSetsTheFieldOfViewOfTheSensor) {
+  scene::ScenarioDesc scenario;
+  scenario.sensor.width_px = 640;
+  scenario.sensor.height_px = 512;
+  scenario.sensor.fov_h_rad = 20.0 * physics::kDegree;
+  scenario.sensor.fov_h_min_rad = 4.0 * physics::kDegree;
+  CigiHost::Options options;
+  options.scenario = &scenario;
+  options.rate_hz = 1.0;
+  gateway_ = std::make_unique<CigiHost>(options, nullptr, counters_, events_);
+  const auto view_of = [](float left, float right, float top, float bottom, unsigned enabled) {
+    cigi::ViewDefinition view;
+    view.left_deg = left;
+    view.right_deg = right;
+    view.top_deg = top;
+    view.bottom_deg = bottom;
+    view.left_enabled = (enabled & 1U) != 0;
+    view.right_enabled = (enabled & 2U) != 0;
+    view.top_enabled = (enabled & 4U) != 0;
+    view.bottom_enabled = (enabled & 8U) != 0;
+    return view;
+  };
+  const auto after = [&](const cigi::ViewDefinition& view) {
+    now_ns_ += 1'000'000'000;
+    send(cigi::IgMode::operate, {seeker(), view});
+    EXPECT_TRUE(next());
+    return frame_->fov_h_rad ? *frame_->fov_h_rad / physics::kDegree : 0.0;
+  };
+  const auto unused = [&] { return counters_.get(Counter::gateway_packets_unused); };
+  // tan(3 deg) * 512 / 640 = tan(2.40082 deg)
+  EXPECT_NEAR(after(view_of(-3, 3, 0, 0, 3)), 6.0, 1e-5);
+  EXPECT_NEAR(after(view_of(-5, 5, 4.00509F, -4.00509F, 15)), 10.0, 1e-5);
+  EXPECT_NEAR(after(view_of(0, 0, 2.40082F, -2.40082F, 12)), 6.0, 1e-4);
+  EXPECT_NEAR(after(view_of(-2, 2, 0, 0, 3)), 4.0, 1e-5);
+  EXPECT_NEAR(after(view_of(-10, 10, 0, 0, 3)), 20.0, 1e-5);
+  EXPECT_NEAR(after(view_of(-1, 1, 1, 1, 0)), 20.0, 1e-5) << "nothing is enabled";
+  EXPECT_EQ(unused(), 0U);
+  // Each of these has no effect, and the host is told why.
+  std::uint64_t told = 0;
+  for (const auto& view :
+       {view_of(-3, 4, 0, 0, 3), view_of(0, 4, 0, 0, 2), view_of(-3, 3, 3, -3, 15),
+        view_of(-1.9F, 1.9F, 0, 0, 3), view_of(-11, 11, 0, 0, 3), view_of(0, 0, 5, -4, 12),
+        view_of(3, -3, 0, 0, 3)}) {
+    EXPECT_NEAR(after(view), 20.0, 1e-5) << told;
+    EXPECT_EQ(unused(), ++told);
+  }
+  // Standby forgets the view.
+  send(cigi::IgMode::standby);
+  EXPECT_EQ(after(view_of(0, 0, 0, 0, 0)), 0.0);
 }
 
 TEST_F(CigiHostTest, ATimeOfDayThatIsSentAgainAndAgainSetsTheClockOnce) {

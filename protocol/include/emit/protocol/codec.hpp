@@ -37,6 +37,7 @@ enum class DecodeStatus : std::uint8_t {
   invalid_pose = 6,
   /// A value is NaN, infinite or outside the range that docs/wire.md gives.
   invalid_environment = 13,
+  invalid_view = 14,  ///< the field of view is no number, or beyond what any sensor may have
 };
 /// Returns the English name of a status, for messages. RT-safe.
 [[nodiscard]] std::string_view to_string(DecodeStatus status) noexcept;

@@ -28,6 +28,7 @@ enum class StatusCode : std::uint8_t {
   overloaded = 11,
   internal = 12,
   invalid_environment = 13,
+  invalid_view = 14,
 };
 
 /// Detail of a `not_allowed` status for a host frame whose run another host has replaced.

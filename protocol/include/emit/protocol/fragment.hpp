@@ -13,7 +13,7 @@
 
 /// UDP fragments of a frame (docs/wire.md section 4). Each fragment describes itself.
 ///
-/// The byte stream of one frame is: frame header (320 bytes), pixels, 0 to 319 zero bytes, the
+/// The byte stream of one frame is: frame header (384 bytes), pixels, 0 to 383 zero bytes, the
 /// frame header again. The zero bytes keep the second header within the last fragment, so one lost
 /// fragment never costs both headers.
 namespace emit::protocol {

@@ -16,8 +16,8 @@
 namespace emit::protocol {
 
 inline constexpr std::uint32_t kFrameMagic = 0x524D4645;  ///< "EFMR" as bytes E F M R
-inline constexpr std::uint8_t kFrameHeaderVersion = 1;
-inline constexpr std::size_t kFrameHeaderBytes = 320;
+inline constexpr std::uint8_t kFrameHeaderVersion = 2;
+inline constexpr std::size_t kFrameHeaderBytes = 384;
 
 /// Number format of a pixel.
 enum class PixelFormat : std::uint8_t { float32 = 1 };
@@ -180,6 +180,9 @@ struct FrameHeader {
   /// Shift that emitd has applied, with kOutputShifted; right and down in the sensor's image.
   float applied_shift_x_px = 0.0F;
   float applied_shift_y_px = 0.0F;
+  /// Horizontal field of view of the sensor's image (of which the frame may show a window), rad. 0:
+  /// the source does not know it.
+  float fov_h_rad = 0.0F;
 };
 
 /// Largest n that a client may ask for in "every n-th frame".

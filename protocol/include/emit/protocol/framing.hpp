@@ -21,7 +21,7 @@ inline constexpr std::uint32_t kDefaultMaxControlBytes = 1u << 20;
 /// Kind of a record's body. A receiver skips records of an unknown kind.
 enum class RecordKind : std::uint8_t {
   control = 1,  ///< Protobuf emit.v1.ControlRecord
-  frame = 2,    ///< frame header (320 bytes), then the pixels in the encoding that it names
+  frame = 2,    ///< frame header (384 bytes), then the pixels in the encoding that it names
   /// Protobuf emit.v1.HostFrame without the envelope; the receiver allocates nothing for it.
   host_frame = 3,
   /// Request for missing fragments (resend.hpp); the receiver allocates nothing for it.
@@ -122,8 +122,8 @@ struct FrameView {
 };
 
 /// Decodes the body of a frame record. The CRC of the pixels is not checked.
-/// Errors (protocol): those of decode_frame_header(), a body length that differs from 320 +
-/// payload_bytes (encoded: 320 + encoded_bytes), or an encoding that is not smaller than the
+/// Errors (protocol): those of decode_frame_header(), a body length that differs from 384 +
+/// payload_bytes (encoded: 384 + encoded_bytes), or an encoding that is not smaller than the
 /// pixels.
 [[nodiscard]] physics::Result<FrameView> decode_frame_record(std::span<const std::byte> body);
 

@@ -54,6 +54,9 @@ struct HostFrameData {
   std::array<EntityStateData, kMaxEntitiesPerFrame> entities;
   std::uint32_t entity_count = 0;
   std::optional<EnvironmentData> environment;
+  /// Yaw, pitch and roll of the detector against the seeker's body, rad; none: unchanged.
+  std::optional<glm::dvec3> gimbal_rad;
+  std::optional<double> fov_h_rad;  ///< horizontal field of view from here on; none: unchanged
 
   /// Returns the entities in use.
   /// @pre entity_count <= kMaxEntitiesPerFrame

@@ -69,6 +69,9 @@ struct FrameRequest {
   std::int64_t sim_time_ns = 0;      ///< instant that the image shows: entities at this time
   std::int64_t thermal_time_ns = 0;  ///< instant of the temperatures; in a hold before sim_time_ns
   physics::Pose sensor_pose;         ///< body frame of the seeker head, x along the boresight
+  /// Horizontal field of view, rad; 0: that of the scenario. Beyond what the scenario's sensor may
+  /// have the frame is coarse (FrameStats::coarse).
+  double fov_h_rad = 0.0;
   std::uint8_t quality_level =
       0;  ///< quality level; 0 is full quality, a number too high is the last one
   /// Part of the image that is requested. Its pixels have the bits of the whole image. The other
@@ -117,6 +120,7 @@ struct FrameView {
   std::uint64_t frame_number = 0;
   std::int64_t sim_time_ns = 0;
   physics::Pose sensor_pose;
+  double fov_h_rad = 0.0;  ///< horizontal field of view, rad
   std::uint32_t width_px = 0;
   std::uint32_t height_px = 0;
   std::vector<std::span<const float>> radiance_w_m2_sr;  ///< one plane per band, in their order

@@ -9,10 +9,10 @@ import struct
 from .crc32c import crc32c
 from .errors import ProtocolError
 
-FRAME_HEADER_BYTES = 320
+FRAME_HEADER_BYTES = 384
 _MAGIC = 0x524D4645
-_VERSION = 1
-_LAYOUT = struct.Struct("<I4BHHIIffIfIIIQQQQ10qQ3d4dBBBxfqqQffIIIIIIBB2xfffqfI")
+_VERSION = 2
+_LAYOUT = struct.Struct("<I4BHHIIffIfIIIQQQQ10qQ3d4dBBBxfqqQffIIIIIIBB2xfffqff60xI")
 assert _LAYOUT.size == FRAME_HEADER_BYTES
 
 FLAG_NAMES = (
@@ -96,6 +96,7 @@ class FrameHeader:
     output_step_bits: int  # what was done to the pixels; OUTPUT_STEP_NAMES has the names of the bits
     applied_shift_x_px: float  # with the step "shifted": the shift that the daemon has applied to the pixels
     applied_shift_y_px: float
+    fov_h_rad: float  # horizontal, of the whole image of the sensor; 0: the source does not know it
 
     @property
     def output_steps(self) -> frozenset[str]:
@@ -150,7 +151,7 @@ def parse_frame_header(raw: bytes) -> FrameHeader:
     header = FrameHeader(
         _QUANTITIES[quantity], _CHANNEL_KINDS.get(channel_kind, f"kind_{channel_kind}"), *fields[6:11],
         fields[11] & ~RECEIVER_FLAG_BITS, *fields[12:31], position, quaternion, quality_level, _ENCODINGS[encoding],
-        *fields[42:-8], _motion_state(fields[-8]), *fields[-7:-2], output_steps, applied_x_px, fields[-2])
+        *fields[42:-9], _motion_state(fields[-9]), *fields[-8:-3], output_steps, applied_x_px, *fields[-3:-1])
     if header.payload_bytes != 4 * header.width_px * header.height_px:
         raise ProtocolError(f"frame header: {header.payload_bytes} payload bytes for {header.width_px}x"
                             f"{header.height_px} float32 pixels")

@@ -66,10 +66,13 @@ class HostClient(abc.ABC):
         return UdpHost(parsed.host, parsed.port)
 
     def send_pose(self, sim_time_ns: int, seeker: Pose, entities: Sequence[EntityState] = (),
-                  environment: Environment | None = None, timeout_s: float = DEFAULT_TIMEOUT_S) -> int:
+                  environment: Environment | None = None, timeout_s: float = DEFAULT_TIMEOUT_S,
+                  fov_h_rad: float | None = None,
+                  gimbal_rad: tuple[float, float, float] | None = None) -> int:
         """Sends the next host frame of this client's run and returns its number."""
         self.frame_number += 1
-        self.send(HostFrame(self.run_id, self.frame_number, sim_time_ns, seeker, entities, environment), timeout_s)
+        self.send(HostFrame(self.run_id, self.frame_number, sim_time_ns, seeker, entities, environment, fov_h_rad,
+                            gimbal_rad), timeout_s)
         return self.frame_number
 
     def send(self, frame: HostFrame, timeout_s: float = DEFAULT_TIMEOUT_S) -> None:

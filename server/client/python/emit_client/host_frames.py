@@ -120,6 +120,9 @@ class HostFrame:
     seeker: Pose = Pose()
     entities: Sequence[EntityState] = ()
     environment: Environment | None = None  # None: the weather stays as it is
+    fov_h_rad: float | None = None  # horizontal field of view from this frame on; None: unchanged
+    # Yaw, pitch and roll of the detector against the seeker's body; None: unchanged.
+    gimbal_rad: tuple[float, float, float] | None = None
 
     def encode(self) -> bytes:
         """Returns the bytes of an emit.v1.HostFrame. Raises ArgumentError where the frame cannot be encoded."""
@@ -131,7 +134,10 @@ class HostFrame:
                 protocol_version=PROTOCOL_VERSION, frame_number=self.frame_number, sim_time_ns=self.sim_time_ns,
                 run_id=self.run_id, seeker=self.seeker.to_message(),
                 entities=[entity.to_message() for entity in self.entities],
-                environment=None if self.environment is None else self.environment.to_message())
+                environment=None if self.environment is None else self.environment.to_message(),
+                fov_h_rad=self.fov_h_rad,
+                gimbal=None if self.gimbal_rad is None else host_pb2.Gimbal(
+                    yaw_rad=self.gimbal_rad[0], pitch_rad=self.gimbal_rad[1], roll_rad=self.gimbal_rad[2]))
         except (TypeError, ValueError) as error:
             if isinstance(error, ArgumentError):
                 raise

@@ -28,6 +28,7 @@ class StatusCode(enum.IntEnum):
     OVERLOADED = 11
     INTERNAL = 12
     INVALID_ENVIRONMENT = 13
+    INVALID_VIEW = 14
 
 
 @dataclasses.dataclass(frozen=True)

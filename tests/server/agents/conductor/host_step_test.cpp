@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,46 @@ TEST(HostStep, SendsFrameKForPoseKWithoutGaps) {
     EXPECT_EQ(header.pose.position_world_m.x, static_cast<double>(k));
     EXPECT_EQ(header.flags, 0U);
   }
+}
+
+TEST(HostStep, ShowsTheFieldOfViewThatTheHostHasSetUntilItSetsAnother) {
+  Rig rig;
+  const auto zoom = [](double fov_h_rad) {
+    return [fov_h_rad](protocol::HostFrameData& frame) { frame.fov_h_rad = fov_h_rad; };
+  };
+  rig.send(1, 0);
+  rig.with(zoom(0.25)).send(2, kMs);
+  rig.send(3, 2 * kMs);
+  rig.with(zoom(test::kFovMinRad)).send(4, 3 * kMs);
+  rig.settle();
+  // A new run begins with the field of view of the scenario.
+  rig.send(1, 0, 0.0, 2);
+  rig.settle();
+  ASSERT_EQ(rig.frames.size(), 5U);
+  const std::vector<double> expected = {test::kFovRad, 0.25, 0.25, test::kFovMinRad, test::kFovRad};
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    EXPECT_EQ(rig.frames[i].header.fov_h_rad, static_cast<float>(expected[i])) << i;
+    EXPECT_EQ(rig.script.submitted[i].fov_h_rad, expected[i]) << i;
+  }
+  EXPECT_TRUE(rig.replies.empty());
+}
+
+TEST(HostStep, RefusesAFieldOfViewThatTheSensorCannotHaveAndTakesTheRestOfTheFrame) {
+  Rig rig;
+  std::uint64_t number = 0;
+  for (const double fov_h_rad : {test::kFovRad * 1.001, test::kFovMinRad * 0.999, 0.0, -1.0,
+                                 std::numeric_limits<double>::quiet_NaN()}) {
+    ++number;
+    rig.with([&](protocol::HostFrameData& frame) { frame.fov_h_rad = fov_h_rad; })
+        .send(number, static_cast<std::int64_t>(number) * kMs);
+    rig.settle();
+    ASSERT_EQ(rig.replies.size(), number) << fov_h_rad;
+    EXPECT_EQ(rig.replies.back().code, StatusCode::invalid_view);
+    EXPECT_EQ(rig.replies.back().host_frame_number, number);
+    ASSERT_EQ(rig.frames.size(), number);
+    EXPECT_EQ(rig.frames.back().header.fov_h_rad, static_cast<float>(test::kFovRad));
+  }
+  EXPECT_EQ(rig.count(Counter::refused_invalid_view), number);
 }
 
 TEST(HostStep, GivesTheSamePixelsWhateverTheTiming) {

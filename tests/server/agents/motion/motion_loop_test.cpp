@@ -30,6 +30,7 @@ using test::kSecondNs;
 
 constexpr glm::dvec2 kSizePx{640.0, 512.0};
 const double kFocalPx = 320.0 / std::tan(5.0 * physics::kDegree);
+const glm::dvec3 kGimbalRad{0.2, -0.1, 0.05};  // of the seeker that is injected into
 const glm::dvec3 kTargetM{900.0, 1200.0, 250.0};
 
 enum class Link : std::uint8_t { udp, memory, acutrol };
@@ -40,6 +41,7 @@ struct LoopOptions {
   double delay_s = 0.001;
   double noise_arcsec = 0.0;
   bool projects = true;
+  bool injects_too = false;  ///< a second channel looks along the detector of the seeker
   std::int64_t display_delay_ns = 10 * kMs;
   bool applies_shift = false;  ///< a second channel shows a window, moved by the shift
 };
@@ -102,6 +104,7 @@ class Loop {
     auto follower = TableFollower::create(plan_.follower);
     EXPECT_TRUE(follower.has_value());
     if (options.applies_shift) apply_shift();
+    if (options.injects_too) inject_too();
     agent_.emplace(rig_.context(), std::move(*link), std::move(*follower), kMs);
     EXPECT_TRUE(agent_->on_start());
     TableSimulator::Options simulated;
@@ -199,17 +202,33 @@ class Loop {
     }
     scenario.channels[1].window_px = {2, 1, 4, 2};
     scenario.channels[1].output.apply_shift = true;
-    auto table = make_channels(scenario, *rig_.render().source_info());
+    auto table = make_channels(scenario, *rig_.render().source_info(), true);
     ASSERT_TRUE(table.has_value()) << table.error().text;
+    rig_.context().cameras = std::move(table->cameras);
     rig_.context().channels = std::move(table->channels);
     rig_.context().pictures = std::move(table->pictures);
     rig_.context().shifts_pictures = true;
     rig_.render().shift_by(plan_);
   }
+  /// Channels: one along the projector and one along the detector.
+  void inject_too() {
+    scene::ScenarioDesc scenario;
+    scenario.bands = {{"8-12", 8.0, 12.0, {}}};
+    scenario.channels.resize(2);
+    for (scene::ChannelDesc& channel : scenario.channels) channel.band = "8-12";
+    scenario.channels[0].kind = scene::ChannelKind::projector;
+    auto table = make_channels(scenario, *rig_.render().source_info(), true);
+    ASSERT_TRUE(table.has_value()) << table.error().text;
+    ASSERT_EQ(table->cameras.size(), 2U);
+    rig_.context().channels = std::move(table->channels);
+    rig_.context().pictures = std::move(table->pictures);
+    rig_.context().cameras = std::move(table->cameras);
+  }
   void send_pose() {
     const glm::dquat seeker = seeker_at(sim_ns());
     rig_.with([&](protocol::HostFrameData& frame) {
           frame.seeker.world_from_body = seeker;
+          if (options_.injects_too) frame.gimbal_rad = kGimbalRad;
           // A host tells the rates of its seeker.
           const double step_s = 1e-4;
           const glm::dquat turn = glm::conjugate(seeker) *
@@ -358,6 +377,47 @@ TEST(MotionLoop, geometry_holds_over_the_field_in_every_nesting_order) {
     }
     EXPECT_EQ(loop.rig().frames.back().header.motion_state, MotionState::following) << rings;
   }
+}
+
+/// One daemon, both kinds: the projected image is right through the axes, and the injected one is
+/// that of the detector on its gimbals, over the whole field of both.
+TEST(MotionLoop, geometry_holds_for_projection_and_injection_at_once) {
+  LoopOptions options;
+  options.delay_s = 0.0;
+  options.display_delay_ns = 0;
+  options.injects_too = true;
+  Loop loop(options);
+  loop.run(8 * kSecondNs);
+  const std::size_t from = loop.rig().frames.size();
+  loop.monitors.clear();
+  loop.run(1 * kSecondNs);
+  const glm::dmat3 body_from_detector =
+      glm::mat3_cast(glm::angleAxis(kGimbalRad.x, glm::dvec3(0.0, 0.0, 1.0)) *
+                     glm::angleAxis(kGimbalRad.y, glm::dvec3(0.0, 1.0, 0.0)) *
+                     glm::angleAxis(kGimbalRad.z, glm::dvec3(1.0, 0.0, 0.0)));
+  int projected = 0;
+  for (std::size_t i = from + 1; i < loop.rig().frames.size(); ++i) {
+    const PublishFrame& frame = loop.rig().frames[i];
+    if (frame.header.display_ns > loop.rig().clock.tai_ns()) continue;
+    ASSERT_EQ(frame.image.camera_count, 2U);
+    protocol::FrameHeader of_projector = frame.header;
+    of_projector.pose = frame.image.cameras[0].pose;
+    const glm::dmat3 detector =
+        glm::mat3_cast(Loop::seeker_at(frame.header.sim_time_ns)) * body_from_detector;
+    const glm::dmat3 injected = glm::mat3_cast(frame.image.cameras[1].pose.world_from_body);
+    for (double x = -320.0; x <= 320.0; x += 160.0) {
+      for (double y = -256.0; y <= 256.0; y += 128.0) {
+        EXPECT_LT(loop.pointing_error_px(of_projector, {x, y}), 0.05) << x << ", " << y;
+        // A point that the injected image shows at (x, y), seen by the detector itself.
+        const glm::dvec3 seen = glm::transpose(detector) * (injected * glm::dvec3(kFocalPx, x, y));
+        EXPECT_LT(glm::distance(kFocalPx * glm::dvec2(seen.y, seen.z) / seen.x, glm::dvec2(x, y)),
+                  0.05);
+      }
+    }
+    ++projected;
+  }
+  EXPECT_GE(projected, 98);
+  EXPECT_EQ(loop.rig().frames.back().header.motion_state, MotionState::following);
 }
 
 TEST(MotionLoop, an_injected_frame_looks_along_the_seeker) {
@@ -576,15 +636,6 @@ TEST(MotionLoop, an_agent_that_did_not_run_leaves_out_commands_and_counts_them) 
   loop.run(kMs);
   EXPECT_EQ(loop.rig().count(Counter::axes_commands), sent + 1);
   EXPECT_EQ(loop.rig().count(Counter::axes_commands_missed), 50U);
-}
-
-TEST(MotionLoop, both_kinds_of_channels_in_one_daemon_are_refused) {
-  std::vector<Channel> channels = channels_of(scene::ChannelKind::projector);
-  channels.push_back(channels_of(scene::ChannelKind::injection).front());
-  const auto plan =
-      make_motion_plan(daemon_config({}, "127.0.0.1:1"), scenario_with_target(), channels);
-  ASSERT_FALSE(plan.has_value());
-  EXPECT_THAT(plan.error().text, ::testing::HasSubstr("two daemons"));
 }
 
 }  // namespace

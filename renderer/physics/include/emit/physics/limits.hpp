@@ -60,7 +60,7 @@ inline constexpr Count kShadowTaps{1, 256};              ///< blocker search and
 inline constexpr std::uint32_t kMaxRelaxationModes = 2;  ///< emit2014: states per surface sample
 
 // Streams.
-inline constexpr Count kFragmentPayloadBytes{320, 65472};
+inline constexpr Count kFragmentPayloadBytes{384, 65472};
 inline constexpr Count kRingSlots{3, 1024};
 inline constexpr std::uint32_t kMaxFecData = 128;
 inline constexpr std::uint32_t kMaxFecParity = 32;

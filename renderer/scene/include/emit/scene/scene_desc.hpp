@@ -129,9 +129,15 @@ struct SensorDesc {
   std::string name;
   std::uint32_t width_px = 640;
   std::uint32_t height_px = 512;
-  double fov_h_rad = 0.0;
+  double fov_h_rad = 0.0;  ///< horizontal field of view, and the widest that frames may ask for
+  /// Narrowest field of view that frames may ask for; 0: that of `fov_h_rad`.
+  double fov_h_min_rad = 0.0;
   double near_m = 0.1;
   Trajectory trajectory;  ///< used by offline rendering and by demos; host frames override it
+
+  [[nodiscard]] double narrowest_fov_rad() const noexcept {
+    return fov_h_min_rad > 0.0 ? fov_h_min_rad : fov_h_rad;
+  }
 };
 
 /// A rectangle of an image, from the top left.
@@ -146,6 +152,17 @@ struct PixelRect {
 
 /// Use of a channel's frames: injected into a processing unit, or shown by a projector.
 enum class ChannelKind : std::uint8_t { injection, projector };
+/// The camera of a channel where it differs from the sensor: the sensor's image format, from
+/// another place, in another direction or with another field of view.
+struct ChannelCamera {
+  double fov_h_rad = 0.0;                       ///< 0: that of the sensor, as the host sets it
+  glm::dvec3 offset_body_m{0.0};                ///< from the seeker, or the entity, in its axes
+  glm::dvec3 yaw_pitch_roll_rad{0.0};           ///< against the seeker's axes, or the entity's
+  std::optional<std::uint32_t> entity_id = {};  ///< what carries it; none: the seeker
+
+  [[nodiscard]] bool operator==(const ChannelCamera&) const = default;
+};
+
 /// One output stream: a band and a window of the sensor's image.
 struct ChannelDesc {
   std::string name;
@@ -154,6 +171,7 @@ struct ChannelDesc {
   PixelRect window_px = {};     ///< part of the sensor's image; empty: all of it
   std::uint32_t every_nth = 1;  ///< shows frames 1, 1 + n, 1 + 2 n, ... of every run
   ChannelOutput output = {};    ///< what is done to its picture
+  ChannelCamera camera = {};
 };
 
 using physics::ClearSky;
