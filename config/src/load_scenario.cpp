@@ -284,9 +284,10 @@ Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
   resolve_default_material(root, head, scenario, diagnostics);
   check_surroundings(thermal, scenario, diagnostics);
   scenario.sensor = resolve_sensor(root, diagnostics);
-  check_channels(root, scenario, options.require_scene_files, diagnostics);
   scenario.objects =
       resolve_objects(root, scenario.materials, options.require_scene_files, diagnostics);
+  // Channels may be carried by entities.
+  check_channels(root, scenario, options.require_scene_files, diagnostics);
   if (!diagnostics.empty()) {
     return tl::unexpected<physics::Error>(diagnostics.error());
   }

@@ -73,6 +73,12 @@ std::vector<Camera> cameras_of(const std::optional<scene::ScenarioDesc>& scenari
   return cameras;
 }
 
+bool is_view_fixed(const std::vector<Camera>& cameras) noexcept {
+  return std::ranges::any_of(cameras, [](const Camera& camera) {
+    return camera.along_projector && camera.mount.fov_h_rad == 0.0;
+  });
+}
+
 physics::Result<ChannelTable> make_channels(const std::optional<scene::ScenarioDesc>& scenario,
                                             const SourceInfo& source, bool motion) {
   ChannelTable table;

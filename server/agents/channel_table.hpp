@@ -75,6 +75,9 @@ struct ChannelTable {
 [[nodiscard]] std::vector<Camera> cameras_of(const std::optional<scene::ScenarioDesc>& scenario,
                                              bool motion);
 
+/// Returns true where hosts cannot set the field of view: the optics of a projector do not zoom.
+[[nodiscard]] bool is_view_fixed(const std::vector<Camera>& cameras) noexcept;
+
 /// Channels of a scenario, or the one channel of canned frames without a scenario, with all memory
 /// that their images take. The sensor's size is the source's. A scenario without channels gets an
 /// injection channel per band.

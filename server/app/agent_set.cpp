@@ -179,11 +179,8 @@ void AgentSet::make_conductor(TriggerInput* triggers) {
   options.motion = motion_plan_ ? &*motion_plan_ : nullptr;
   if (scenario_ && !options.canned) {
     options.fov_h_rad = scenario_->sensor.fov_h_rad;
-    // The optics of a projector do not zoom with the host.
-    const bool is_fixed = std::ranges::any_of(context_.cameras, [](const Camera& camera) {
-      return camera.along_projector && camera.mount.fov_h_rad == 0.0;
-    });
-    options.fov_h_min_rad = is_fixed ? options.fov_h_rad : scenario_->sensor.narrowest_fov_rad();
+    options.fov_h_min_rad =
+        is_view_fixed(context_.cameras) ? options.fov_h_rad : scenario_->sensor.narrowest_fov_rad();
   }
   conductor_ = std::make_unique<Conductor>(context_, tracks_, options, triggers);
 }

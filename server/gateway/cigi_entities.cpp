@@ -284,11 +284,11 @@ std::optional<Pose> CigiEntities::pose_of(const Entity& entity, int parents) con
   const auto pose = pose_of(*carrier, parents + 1);
   if (!pose) return std::nullopt;
   if (entity.part) return parts_[*entity.part].pose(*pose, time_ns_);
-  return attached(
-      *pose,
-      {control.place.latitude_deg_or_x_m, control.place.longitude_deg_or_y_m,
-       control.place.altitude_m_or_z_m},
-      turn_of(glm::dvec3{control.yaw_deg, control.pitch_deg, control.roll_deg} * kDegree));
+  return attached(*pose,
+                  {control.place.latitude_deg_or_x_m, control.place.longitude_deg_or_y_m,
+                   control.place.altitude_m_or_z_m},
+                  physics::body_from_turned(
+                      glm::dvec3{control.yaw_deg, control.pitch_deg, control.roll_deg} * kDegree));
 }
 
 std::optional<Pose> CigiEntities::pose_of(std::uint16_t id) const noexcept {
@@ -299,7 +299,8 @@ std::optional<Pose> CigiEntities::pose_of(std::uint16_t id) const noexcept {
 std::optional<Pose> CigiEntities::seeker_pose() const noexcept {
   const auto carrier = pose_of(carrier_);
   if (!carrier) return std::nullopt;
-  return attached(*carrier, view_offset_body_m_, turn_of(view_yaw_pitch_roll_rad_));
+  return attached(*carrier, view_offset_body_m_,
+                  physics::body_from_turned(view_yaw_pitch_roll_rad_));
 }
 
 std::optional<Pose> CigiEntities::pose_of_part(std::uint16_t entity_id,

@@ -299,10 +299,10 @@ void CigiHost::take_view(const cigi::ViewDefinition& packet) noexcept {
     return;
   }
   const double fov_h_rad = 2.0 * half_h_rad;
-  if (sensor.narrowest_fov_rad() == sensor.fov_h_rad) {
+  if (options_.is_view_fixed || sensor.narrowest_fov_rad() == sensor.fov_h_rad) {
     // Hosts state again what they know of the sensor, in their own rounding.
     if (std::abs(half_h_rad / physics::kDegree - now_h_deg) <= kToleranceDeg) return;
-    no_effect(packet, "the scenario fixes another field of view");
+    no_effect(packet, "another field of view is fixed here");
     return;
   }
   constexpr double kSlackRad = 1e-3 * physics::kDegree;  // float32 degrees round

@@ -39,6 +39,7 @@ class CigiHost final : public HostGateway {
     double rate_hz = 60.0;           ///< of Start Of Frame
     std::int64_t first_time_ns = 0;  ///< simulation time of the first message of a run
     const scene::ScenarioDesc* scenario = nullptr;  ///< null: there is none
+    bool is_view_fixed = false;                     ///< hosts cannot set the field of view
   };
   /// The scenario, the counters and the events outlive the object.
   /// @param scene  what questions are about; null: there are no answers

@@ -11,12 +11,6 @@ namespace cigi = protocol::cigi;
 using physics::kDegree;
 using physics::Pose;
 
-glm::dquat turn_of(const glm::dvec3& yaw_pitch_roll_rad) noexcept {
-  return glm::angleAxis(yaw_pitch_roll_rad.x, glm::dvec3(0.0, 0.0, 1.0)) *
-         glm::angleAxis(yaw_pitch_roll_rad.y, glm::dvec3(0.0, 1.0, 0.0)) *
-         glm::angleAxis(yaw_pitch_roll_rad.z, glm::dvec3(1.0, 0.0, 0.0));
-}
-
 Pose attached(const Pose& parent, const glm::dvec3& offset_body_m,
               const glm::dquat& turn) noexcept {
   return {parent.position_world_m + parent.world_from_body * offset_body_m,
@@ -67,7 +61,7 @@ CigiPart::Freedoms CigiPart::at(std::int64_t time_ns) const noexcept {
   const auto moved = [&](std::size_t i) { return rates_per_s_[i] * for_s; };
   glm::dvec3 way_m{moved(0), moved(1), moved(2)};
   // The part's own axes are taken as they were when the rates were set.
-  if (is_local_) way_m = turn_of({values_[3], values_[4], values_[5]}) * way_m;
+  if (is_local_) way_m = physics::body_from_turned({values_[3], values_[4], values_[5]}) * way_m;
   for (std::size_t i = 0; i < 3; ++i) out[i] += way_m[static_cast<glm::length_t>(i)];
   for (std::size_t i = 3; i < 6; ++i) out[i] += moved(i);
   return out;
@@ -80,8 +74,9 @@ void CigiPart::move_on(std::int64_t time_ns) noexcept {
 
 Pose CigiPart::pose(const Pose& carrier, std::int64_t time_ns) const noexcept {
   const Freedoms f = at(time_ns);
-  const Pose rest = attached(carrier, joint_.place_m, turn_of(joint_.yaw_pitch_roll_rad));
-  return attached(rest, {f[0], f[1], f[2]}, turn_of({f[3], f[4], f[5]}));
+  const Pose rest =
+      attached(carrier, joint_.place_m, physics::body_from_turned(joint_.yaw_pitch_roll_rad));
+  return attached(rest, {f[0], f[1], f[2]}, physics::body_from_turned({f[3], f[4], f[5]}));
 }
 
 }  // namespace emit::server

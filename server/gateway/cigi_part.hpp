@@ -11,9 +11,6 @@
 
 namespace emit::server {
 
-/// Returns the turn of a body by yaw about z, pitch about y and roll about x, in this order.
-[[nodiscard]] glm::dquat turn_of(const glm::dvec3& yaw_pitch_roll_rad) noexcept;
-
 /// Returns the pose of a body that is fixed to another one.
 [[nodiscard]] physics::Pose attached(const physics::Pose& parent, const glm::dvec3& offset_body_m,
                                      const glm::dquat& turn) noexcept;

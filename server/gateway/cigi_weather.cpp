@@ -14,12 +14,6 @@ namespace emit::server {
 
 namespace cigi = protocol::cigi;
 
-namespace {
-
-constexpr double kZeroCelsiusK = 273.15;
-
-}  // namespace
-
 void CigiWeather::clear() noexcept {
   air_k_.reset();
   cover_frac_ = {};
@@ -30,7 +24,7 @@ void CigiWeather::clear() noexcept {
 
 bool CigiWeather::take(const cigi::AtmosphereControl& packet) noexcept {
   protocol::EnvironmentData probe;
-  probe.air_k = packet.air_temperature_c + kZeroCelsiusK;
+  probe.air_k = packet.air_temperature_c + physics::kZeroCelsiusK;
   probe.wind_m_s = packet.horizontal_wind_m_s;
   if (protocol::check_environment(probe) != protocol::DecodeStatus::ok) return false;
   air_k_ = probe.air_k;

@@ -55,6 +55,11 @@ class Encoding(unittest.TestCase):
         self.assertFalse(second.HasField("pose") or second.off or second.teleport)
         self.assertEqual((message.environment.air_k, message.environment.film_w_m2_k), (280, 6))
         self.assertFalse(message.environment.HasField("environment_k"))
+        looking = host_pb2.HostFrame.FromString(HostFrame(1, 2, 3, fov_h_rad=0.25, gimbal_rad=(0.1, -0.2, 0.3)).encode())
+        self.assertEqual(looking.fov_h_rad, 0.25)
+        self.assertEqual((looking.gimbal.yaw_rad, looking.gimbal.pitch_rad, looking.gimbal.roll_rad), (0.1, -0.2, 0.3))
+        for field in ("fov_h_rad", "gimbal"):
+            self.assertFalse(host_pb2.HostFrame.FromString(HostFrame(1, 2, 3).encode()).HasField(field))
         self.assertFalse(host_pb2.HostFrame.FromString(HostFrame(1, 2, 3).encode()).HasField("environment"))
 
     def test_a_pose_at_the_origin_is_present(self):

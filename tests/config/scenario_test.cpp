@@ -99,6 +99,7 @@ every_nth = 4
 fov_h_deg = 8.0
 offset_m = [1.0, -2.0, 0.5]
 yaw_pitch_roll_deg = [90.0, -45.0, 0.0]
+carrier_entity = 11
 [[channel]]
 name = "array"
 kind = "projector"

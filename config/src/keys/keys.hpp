@@ -168,26 +168,28 @@ std::optional<std::string> write_array(const std::vector<T>& elements, const Key
 /// Numbers as a TOML array.
 [[nodiscard]] std::string toml_vector(const double* values, std::size_t count);
 
-/// Three numbers. Nothing is written where the field has no value.
+/// Three numbers, which are multiplied by `scale` when they are read. Nothing is written where the
+/// field has no value.
 template <class T, class Field>
-Key<T> vector3(std::string name, std::string unit, Field field, std::string meaning) {
+Key<T> vector3(std::string name, std::string unit, Field field, std::string meaning,
+               double scale = 1.0) {
   Key<T> key;
   key.spec = {name, "array of 3 floats", std::move(unit), "finite", std::move(meaning), false};
-  key.read = [name, field](T& out, const Node& node, Diagnostics& diagnostics) {
+  key.read = [name, field, scale](T& out, const Node& node, Diagnostics& diagnostics) {
     double values[3] = {0.0, 0.0, 0.0};
     const std::size_t faults = diagnostics.size();
     read_vector(node, name, 3, values, diagnostics);
     if (diagnostics.size() == faults) {
-      field(out) = glm::dvec3(values[0], values[1], values[2]);
+      field(out) = scale * glm::dvec3(values[0], values[1], values[2]);
     }
   };
-  key.write = [field](const T& in) -> std::optional<std::string> {
+  key.write = [field, scale](const T& in) -> std::optional<std::string> {
     const std::optional<glm::dvec3> value = field(in);
     if (!value) {
       return std::nullopt;
     }
-    const double values[3] = {value->x, value->y, value->z};
-    return toml_vector(values, 3);
+    return "[" + unscaled_number(value->x, scale) + ", " + unscaled_number(value->y, scale) + ", " +
+           unscaled_number(value->z, scale) + "]";
   };
   return key;
 }

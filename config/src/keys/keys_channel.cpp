@@ -128,29 +128,20 @@ void add_camera_keys(KeyTable<ChannelDesc>& keys) {
                           "cut: `sensor.fov_h_min_deg` to `sensor.fov_h_deg`. 0: that of the "
                           "sensor, which hosts may set.",
                           physics::kDegree)));
-  keys.push_back(custom<ChannelDesc>(
-      {"offset_m", "array of 3 floats", "m", "finite",
-       "Place of the camera from the seeker, forward, right and down. Without it the same.", false},
-      [](ChannelDesc& out, const Node& node, Diagnostics& diagnostics) {
-        read_vector(node, "offset_m", 3, &out.camera.offset_body_m.x, diagnostics);
-      },
-      [](const ChannelDesc& in) -> std::optional<std::string> {
-        if (in.camera.offset_body_m == glm::dvec3(0.0)) return std::nullopt;
-        return toml_vector(&in.camera.offset_body_m.x, 3);
-      }));
-  keys.push_back(custom<ChannelDesc>(
-      {"yaw_pitch_roll_deg", "array of 3 floats", "deg", "finite",
-       "Turn of the camera against the seeker: yaw right, then pitch up, then roll right.", false},
-      [](ChannelDesc& out, const Node& node, Diagnostics& diagnostics) {
-        glm::dvec3 turn_deg(0.0);
-        read_vector(node, "yaw_pitch_roll_deg", 3, &turn_deg.x, diagnostics);
-        out.camera.yaw_pitch_roll_rad = turn_deg * physics::kDegree;
-      },
-      [](const ChannelDesc& in) -> std::optional<std::string> {
-        if (in.camera.yaw_pitch_roll_rad == glm::dvec3(0.0)) return std::nullopt;
-        const glm::dvec3 turn_deg = in.camera.yaw_pitch_roll_rad / physics::kDegree;
-        return toml_vector(&turn_deg.x, 3);
-      }));
+  const auto add = [&](Key<ChannelDesc> key, glm::dvec3 scene::ChannelCamera::*member) {
+    keys.push_back(written_if<ChannelDesc>(
+        [member](const ChannelDesc& in) { return in.camera.*member != glm::dvec3(0.0); },
+        std::move(key)));
+  };
+  add(vector3<ChannelDesc>("offset_m", "m", EMIT_FIELD(camera.offset_body_m),
+                           "Place of the camera from the seeker, forward, right and down. Without "
+                           "it the same."),
+      &scene::ChannelCamera::offset_body_m);
+  add(vector3<ChannelDesc>("yaw_pitch_roll_deg", "deg", EMIT_FIELD(camera.yaw_pitch_roll_rad),
+                           "Turn of the camera against the seeker: yaw right, then pitch up, then "
+                           "roll right.",
+                           physics::kDegree),
+      &scene::ChannelCamera::yaw_pitch_roll_rad);
   keys.push_back(custom<ChannelDesc>(
       {"carrier_entity", "integer", "", "an entity",
        "Entity that carries the camera in place of the seeker; offset and turn are in its axes.",

@@ -37,9 +37,9 @@ struct Field {
   physics::limits::Interval range;
 };
 
-constexpr double kIceK = 273.15;
-const Field kAir{"dry bulb", &YearRecord::air_k, 1.0, kIceK, 99.9, physics::limits::kAirK};
-const Field kDew{"dew point", &YearRecord::dew_point_k, 1.0, kIceK, 99.9, {150.0, 340.0}};
+using physics::kZeroCelsiusK;
+const Field kAir{"dry bulb", &YearRecord::air_k, 1.0, kZeroCelsiusK, 99.9, physics::limits::kAirK};
+const Field kDew{"dew point", &YearRecord::dew_point_k, 1.0, kZeroCelsiusK, 99.9, {150.0, 340.0}};
 const Field kWind{"wind speed", &YearRecord::wind_m_s, 1.0, 0.0, 999.0, physics::limits::kWindMS};
 const Field kCover{"opaque sky cover",         &YearRecord::cloud_frac, 0.1, 0.0, 99.0,
                    physics::limits::kCloudFrac};
@@ -75,7 +75,6 @@ class Lines {
     }
     return false;
   }
-  [[nodiscard]] std::string_view text() const { return line_; }
   [[nodiscard]] std::size_t number() const { return number_; }
   /// Cells between commas; quotes keep a comma.
   [[nodiscard]] std::vector<std::string_view> cells() const {

@@ -5,7 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <map>
-#include <numbers>
+#include <optional>
 #include <span>
 
 #include "emit/physics/clear_sky.hpp"
@@ -38,7 +38,8 @@ struct Interval {
 struct Filled {
   std::size_t values = 0;
   std::size_t longwave = 0;
-  double left_out_w_h_m2 = 0.0;  ///< beam that the height of the sun does not allow, in the file
+  std::size_t sun = 0;           ///< averages of sun and sky light, by day
+  double left_out_w_h_m2 = 0.0;  ///< sun and sky light that the height of the sun does not allow
 };
 
 std::vector<Interval> lay_out(const WeatherYear& year, std::int64_t epoch_utc_ns) {
@@ -107,14 +108,43 @@ void fill_longwave(std::vector<YearRecord>& records, Filled& filled) {
   }
 }
 
+/// Replaces the factors of records that have sun but no average by linear interpolation between
+/// those of other records with sun. Returns their number.
+std::size_t fill_factors(const std::vector<bool>& has_sun, const std::vector<bool>& has_average,
+                         std::vector<double>& factors) {
+  std::vector<std::size_t> gap;
+  std::size_t filled = 0;
+  std::optional<double> before;
+  const auto close = [&](std::optional<double> after) {
+    for (std::size_t k = 0; k < gap.size(); ++k) {
+      const double share = static_cast<double>(k + 1) / static_cast<double>(gap.size() + 1);
+      const double from = before.value_or(after.value_or(0.0));
+      factors[gap[k]] = std::lerp(from, after.value_or(from), share);
+    }
+    filled += gap.size();
+    gap.clear();
+  };
+  for (std::size_t i = 0; i < factors.size(); ++i) {
+    if (!has_sun[i]) continue;
+    if (!has_average[i]) {
+      gap.push_back(i);
+      continue;
+    }
+    close(factors[i]);
+    before = factors[i];
+  }
+  close(std::nullopt);
+  return filled;
+}
+
 /// Spreads averages of records over rows: each row is the clear sky there times a factor, which is
 /// linear between middles and ends of the records and found by iteration. Rows are kParts to a
 /// record and one more.
-/// @param averages  one to a record; none: missing, so that the factor of its neighbours holds
+/// @param averages  one to a record; none: missing, so that the factors of its neighbours count
 /// @param clear     clear sky at the rows
-/// @param left_out  grows by what is left out of each average
+/// @param record_h  length of a record
 std::vector<double> spread(std::span<const std::optional<double>> averages,
-                           std::span<const double> clear, double& left_out) {
+                           std::span<const double> clear, double record_h, Filled& filled) {
   constexpr double kLargestFactor = 3.0;
   constexpr double kNight = 0.01;  // W m-2: the sun is below the horizon
   constexpr int kIterations = 40;
@@ -126,15 +156,18 @@ std::vector<double> spread(std::span<const std::optional<double>> averages,
   };
   std::vector<double> factors(count, 0.0);
   std::vector<bool> has_sun(count, false);
+  std::vector<bool> has_average(count, false);
   std::vector<double> wanted(count, 0.0);
   for (std::size_t i = 0; i < count; ++i) {
     const double sky = average_of([&](std::size_t row) { return clear[row]; }, i);
     const double average = averages[i].value_or(0.0);
-    has_sun[i] = sky > kNight && averages[i];
+    has_sun[i] = sky > kNight;
+    has_average[i] = averages[i].has_value();
     wanted[i] = has_sun[i] ? std::min(average, kLargestFactor * sky) : 0.0;
-    left_out += average - wanted[i];
+    filled.left_out_w_h_m2 += (average - wanted[i]) * record_h;
     if (has_sun[i]) factors[i] = wanted[i] / sky;
   }
+  filled.sun += fill_factors(has_sun, has_average, factors);
   // Between two records the factor is their mean, which a record of little sun keeps low. Towards a
   // record without sun the factor stays as it is.
   const auto between = [&](std::size_t here, std::size_t next) {
@@ -155,7 +188,7 @@ std::vector<double> spread(std::span<const std::optional<double>> averages,
   const auto value_at = [&](std::size_t row) { return clear[row] * factor_at(row); };
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     for (std::size_t i = 0; i < count; ++i) {
-      if (!has_sun[i] || wanted[i] == 0.0) continue;
+      if (!has_sun[i] || !has_average[i] || wanted[i] == 0.0) continue;
       const double now = average_of(value_at, i);
       if (now > 0.0) factors[i] *= std::clamp(wanted[i] / now, 0.1, 10.0);
     }
@@ -195,10 +228,8 @@ void append_rows(const WeatherYear& year, std::span<const Interval> run,
     beams[i] = year.records[run[i].record].direct_normal_w_m2;
     diffuses[i] = year.records[run[i].record].diffuse_horizontal_w_m2;
   }
-  double left_out = 0.0;
-  beam = spread(beams, beam, left_out);
-  filled.left_out_w_h_m2 += left_out * year.record_h;
-  diffuse = spread(diffuses, diffuse, left_out);
+  beam = spread(beams, beam, year.record_h, filled);
+  diffuse = spread(diffuses, diffuse, year.record_h, filled);
   for (std::size_t row = 0; row < rows; ++row) {
     const std::size_t here = std::min(row / kParts, run.size() - 1);
     const double share = static_cast<double>(row - here * kParts) / static_cast<double>(kParts);
@@ -286,13 +317,19 @@ std::vector<WeatherSample> weather_of_year(const WeatherYear& given, const std::
         "{}: the long-wave irradiance of {} records is made of air, dew point and clouds", name,
         filled.longwave));
   }
+  if (filled.sun > 0) {
+    warnings.push_back(
+        fmt::format("{}: {} missing averages of sun or sky light follow the records beside them",
+                    name, filled.sun));
+  }
   constexpr double kYearH = 8760.0;
   const double years = static_cast<double>(intervals.size()) * year.record_h / kYearH;
   const double per_year_w_h_m2 = filled.left_out_w_h_m2 / std::max(years, 1.0 / kYearH);
   constexpr double kWorthSayingW_h_m2 = 500.0;
   if (per_year_w_h_m2 > kWorthSayingW_h_m2) {
     warnings.push_back(fmt::format(
-        "{}: {:.1f} kWh m-2 a year of direct sun are left out, because the sun is too low for them",
+        "{}: {:.1f} kWh m-2 a year of sun and sky light are left out, because the sun is too low "
+        "for them",
         name, per_year_w_h_m2 / 1e3));
   }
   return out;

@@ -9,7 +9,6 @@
 namespace emit::physics {
 namespace {
 
-constexpr double kIcePointK = 273.15;
 // The disc is wholly set below this elevation; the air mass formula ends a few degrees lower.
 constexpr double kLowestElevationDeg = -2.0;
 
@@ -62,7 +61,7 @@ SolarIrradiance clear_sky_irradiance(const SunPosition& sun, Metres height,
 }
 
 double sky_emissivity_frac(Kelvin dew_point, double cloud_frac) noexcept {
-  const double x = (dew_point.value() - kIcePointK) / 100.0;
+  const double x = (dew_point.value() - kZeroCelsiusK) / 100.0;
   const double clear = std::min(1.0, 0.758 + x * (0.521 + x * 0.625));
   return clear + 0.784 * (1.0 - clear) * std::clamp(cloud_frac, 0.0, 1.0);
 }

@@ -38,6 +38,12 @@ glm::dquat world_from_body_heading_pitch_roll(double heading_rad, double pitch_r
   return glm::normalize(kEnuFromNed * ned_from_body);
 }
 
+glm::dquat body_from_turned(const glm::dvec3& yaw_pitch_roll_rad) noexcept {
+  return glm::angleAxis(yaw_pitch_roll_rad.x, glm::dvec3(0.0, 0.0, 1.0)) *
+         glm::angleAxis(yaw_pitch_roll_rad.y, glm::dvec3(0.0, 1.0, 0.0)) *
+         glm::angleAxis(yaw_pitch_roll_rad.z, glm::dvec3(1.0, 0.0, 0.0));
+}
+
 HeadingPitchRoll heading_pitch_roll(const glm::dquat& world_from_body) noexcept {
   const glm::dmat3 ned_from_body =
       glm::mat3_cast(glm::normalize(glm::conjugate(kEnuFromNed) * world_from_body));

@@ -2,7 +2,6 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "agents/conductor/conductor.hpp"
-#include "agents/conductor/turn.hpp"
 
 namespace emit::server {
 
@@ -39,8 +38,8 @@ void Conductor::place_cameras(RenderJob& job,
       shot.pose.position_world_m += shot.pose.world_from_body * camera.mount.offset_body_m;
     }
     if (camera.mount.yaw_pitch_roll_rad != plain.yaw_pitch_roll_rad) {
-      shot.pose.world_from_body =
-          glm::normalize(shot.pose.world_from_body * turn_of(camera.mount.yaw_pitch_roll_rad));
+      shot.pose.world_from_body = glm::normalize(
+          shot.pose.world_from_body * physics::body_from_turned(camera.mount.yaw_pitch_roll_rad));
     }
     shot.fov_h_rad = camera.mount.fov_h_rad > 0.0 ? camera.mount.fov_h_rad : fov_h_rad_;
     shot.window_px = window_around(context_.channels, channels);

@@ -2,7 +2,6 @@
 #include <algorithm>
 
 #include "agents/conductor/conductor.hpp"
-#include "agents/conductor/turn.hpp"
 
 namespace emit::server {
 
@@ -124,7 +123,7 @@ void Conductor::store(const HostFrameData& frame) noexcept {
     }
   }
   if (frame.fov_h_rad) fov_h_rad_ = *frame.fov_h_rad;
-  if (frame.gimbal_rad) body_from_detector_ = turn_of(*frame.gimbal_rad);
+  if (frame.gimbal_rad) body_from_detector_ = physics::body_from_turned(*frame.gimbal_rad);
   if (frame.environment) {
     store_weather(*frame.environment, frame.sim_time_ns);
   }

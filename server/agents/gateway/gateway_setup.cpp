@@ -62,6 +62,7 @@ Result<Made> make_cigi(Context& context, const config::DaemonConfig& config,
   options.rate_hz = options.synchronous ? config.cigi.rate_hz : config.pacing.rate_hz;
   options.first_time_ns = config.source.first_time_ns;
   options.scenario = scenario;
+  options.is_view_fixed = is_view_fixed(context.cameras);
   out.gateway = std::make_unique<CigiHost>(options, std::move(scene), context.counters,
                                            context.gateway_events);
   return out;

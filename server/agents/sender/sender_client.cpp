@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "agents/sender/sender_client.hpp"
 
-#include <limits>
-
 #include <cstdlib>
+#include <limits>
 
 #include "emit/physics/check.hpp"
 

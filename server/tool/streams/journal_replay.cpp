@@ -305,7 +305,8 @@ ReplayBench renderer_bench(const scene::ScenarioDesc& scenario, const JournalRep
                        temperature = options.temperature](std::int64_t first_time_ns) {
     renderer::OutputOptions output;
     output.temperature = output.depth = output.object = temperature;
-    output.slots = 3;
+    // A frame has an image for each camera, all of which are kept for repetitions.
+    output.slots = server::kMaxCameras;
     output.ladder = renderer::Ladder::replayed;
     Progress warm_up("warm-up", 1000);
     return server::make_renderer_source(

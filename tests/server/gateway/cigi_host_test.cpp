@@ -30,7 +30,7 @@ class CigiHostTest : public testing::Test {
   /// Sends a message of the host that arrives now.
   void send(cigi::IgMode mode, const std::vector<cigi::Packet>& packets = {}, bool stamp = false) {
     std::array<std::byte, 4096> memory;
-    cigi::Writer writer(memory, cigi::Version::v3_3, cigi::ByteOrder::big);
+    cigi::Writer writer(memory, version_, cigi::ByteOrder::big);
     cigi::IgControl control;
     control.mode = mode;
     control.host_frame = ++host_frame_;
@@ -69,6 +69,7 @@ class CigiHostTest : public testing::Test {
   std::unique_ptr<protocol::HostFrameData> frame_ = std::make_unique<protocol::HostFrameData>();
   std::int64_t now_ns_ = kStartNs;
   std::uint32_t host_frame_ = 0;
+  cigi::Version version_ = cigi::Version::v3_3;
   std::vector<std::string> texts_;
 };
 
@@ -121,8 +122,11 @@ TEST_F(CigiHostTest, WhatWaitsForNothingNeedsNoReport) {
   EXPECT_TRUE(receive());
 }
 
-/// Every View Definition of both versions, with the field of view that it sets.
-TEST_F(CigiHostTest, ViewDefinitionSetsTheFieldOfViewOfTheSensor) {
+/// View Definition in both versions of CIGI.
+class CigiViewTest : public CigiHostTest, public testing::WithParamInterface<cigi::Version> {};
+
+TEST_P(CigiViewTest, ViewDefinitionSetsTheFieldOfViewOfTheSensor) {
+  version_ = GetParam();
   scene::ScenarioDesc scenario;
   scenario.sensor.width_px = 640;
   scenario.sensor.height_px = 512;
@@ -146,7 +150,13 @@ TEST_F(CigiHostTest, ViewDefinitionSetsTheFieldOfViewOfTheSensor) {
   };
   const auto after = [&](const cigi::ViewDefinition& view) {
     now_ns_ += 1'000'000'000;
-    send(cigi::IgMode::operate, {seeker(), view});
+    if (version_ == cigi::Version::v3_3) {
+      send(cigi::IgMode::operate, {seeker(), view});
+    } else {
+      cigi::EntityPosition place;
+      place.place.altitude_m_or_z_m = 100.0;
+      send(cigi::IgMode::operate, {place, view});
+    }
     EXPECT_TRUE(next());
     return frame_->fov_h_rad ? *frame_->fov_h_rad / physics::kDegree : 0.0;
   };
@@ -171,7 +181,16 @@ TEST_F(CigiHostTest, ViewDefinitionSetsTheFieldOfViewOfTheSensor) {
   // Standby forgets the view.
   send(cigi::IgMode::standby);
   EXPECT_EQ(after(view_of(0, 0, 0, 0, 0)), 0.0);
+  // Where the view is fixed, only what says so again goes without a word.
+  options.is_view_fixed = true;
+  gateway_ = std::make_unique<CigiHost>(options, nullptr, counters_, events_);
+  EXPECT_EQ(after(view_of(-10, 10, 0, 0, 3)), 0.0);
+  EXPECT_EQ(unused(), told);
+  EXPECT_EQ(after(view_of(-5, 5, 0, 0, 3)), 0.0);
+  EXPECT_EQ(unused(), told + 1);
 }
+INSTANTIATE_TEST_SUITE_P(Versions, CigiViewTest,
+                         testing::Values(cigi::Version::v3_3, cigi::Version::v4_0));
 
 TEST_F(CigiHostTest, ATimeOfDayThatIsSentAgainAndAgainSetsTheClockOnce) {
   const scene::ScenarioDesc scenario;  // its epoch is 1970

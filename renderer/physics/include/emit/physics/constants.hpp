@@ -23,6 +23,9 @@ inline constexpr double kC2UmK = kPlanckJS * kSpeedOfLightMPerS / kBoltzmannJPer
 inline constexpr double kPi = 3.14159265358979323846;
 inline constexpr double kDegree = kPi / 180.0;
 
+/// Zero of the Celsius scale, K. Exact.
+inline constexpr double kZeroCelsiusK = 273.15;
+
 /// Mean apparent semi-angle of the sun's disc as seen from the earth.
 inline constexpr double kSunSemiAngleRad = 0.2666 * kDegree;
 /// Effective temperature of the sun's photosphere, K.

@@ -26,6 +26,10 @@ struct Pose {
 [[nodiscard]] glm::dquat world_from_body_heading_pitch_roll(double heading_rad, double pitch_rad,
                                                             double roll_rad) noexcept;
 
+/// Returns body_from_turned of a part that is turned against its body by yaw about z, then pitch
+/// about y, then roll about x (rad; x forward, y right, z down). RT-safe.
+[[nodiscard]] glm::dquat body_from_turned(const glm::dvec3& yaw_pitch_roll_rad) noexcept;
+
 /// Heading, pitch and roll as world_from_body_heading_pitch_roll() takes them.
 struct HeadingPitchRoll {
   double heading_rad = 0.0;  ///< [-pi, pi]
