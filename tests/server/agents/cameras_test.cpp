@@ -153,5 +153,15 @@ TEST(Cameras, WaitForSlotsWithoutLosingOrRepeatingAnImage) {
   EXPECT_EQ(rig.script.held.load(), 0);
 }
 
+TEST(Cameras, AProjectorOfAMotionSimulatorFixesTheViewUnlessItHasItsOwn) {
+  scene::ScenarioDesc scenario = four_views();
+  EXPECT_FALSE(is_view_fixed(cameras_of(scenario, true))) << "none projects";
+  scenario.channels[0].kind = scene::ChannelKind::projector;
+  EXPECT_TRUE(is_view_fixed(cameras_of(scenario, true)));
+  EXPECT_FALSE(is_view_fixed(cameras_of(scenario, false))) << "no motion simulator";
+  scenario.channels[0].camera.fov_h_rad = test::kFovRad;
+  EXPECT_FALSE(is_view_fixed(cameras_of(scenario, true)));
+}
+
 }  // namespace
 }  // namespace emit::server

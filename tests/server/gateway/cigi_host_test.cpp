@@ -181,7 +181,7 @@ TEST_P(CigiViewTest, ViewDefinitionSetsTheFieldOfViewOfTheSensor) {
   // Standby forgets the view.
   send(cigi::IgMode::standby);
   EXPECT_EQ(after(view_of(0, 0, 0, 0, 0)), 0.0);
-  // Where the view is fixed, only what says so again goes without a word.
+  // A fixed view lets pass without a word what says the same again.
   options.is_view_fixed = true;
   gateway_ = std::make_unique<CigiHost>(options, nullptr, counters_, events_);
   EXPECT_EQ(after(view_of(-10, 10, 0, 0, 3)), 0.0);
