@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <map>
 #include <tuple>
 
@@ -18,9 +19,9 @@ namespace emit::reference {
 namespace {
 
 constexpr double kPatchM = 0.2;
-/// Number of reflections that are followed. Each round is weaker by reflectance times view factor,
-/// which is below a fifth in any scene of common materials.
-constexpr int kBounces = 8;
+/// Greatest number of reflections that are followed. Each round is weaker by reflectance times the
+/// share of the view that shows patches: a closed box that absorbs a hundredth needs some 1400.
+constexpr int kMostBounces = 20'000;
 
 /// Calls body(i) for i < n, in parallel.
 template <class Body>
@@ -163,12 +164,77 @@ void SceneExchange::link_patches() {
   }
 }
 
-void SceneExchange::incoming(std::span<const double> direct_w_m2, std::span<const double> face_k,
-                             const ExchangeSky& sky, std::span<Incoming> out) const {
+namespace {
+
+/// Greatest reflectance times share of the view that shows patches: no round of reflections exceeds
+/// this share of the round before.
+double most_reflected_frac(const PatchLinks& links, std::span<const double> reflect) {
+  double most = 0.0;
+  for (std::size_t p = 0; p < reflect.size(); ++p) {
+    double share = 0.0;
+    for (std::size_t at = links.start[p]; at < links.start[p + 1]; ++at) {
+      share += static_cast<double>(links.links[at].share_frac);
+    }
+    most = std::max(most, reflect[p] * share);
+  }
+  return most;
+}
+
+/// Bound of the sum of all rounds x after `last`, from three consecutive rounds. No entry of the
+/// operator K is negative. If y' = K y <= r y in all entries, where y is the sum of two rounds and
+/// r < 1, that sum is at most y' r^2/(1 - r^2) (Collatz and Wielandt). Sums of two rounds serve
+/// because two plates that face each other are dark in turn.
+double bound_of_rest_w_m2(std::span<const double> first, std::span<const double> middle,
+                          std::span<const double> last) {
+  double ratio = 0.0;
+  double most_w_m2 = 0.0;
+  for (std::size_t p = 0; p < last.size(); ++p) {
+    const double before_w_m2 = first[p] + middle[p];
+    const double now_w_m2 = middle[p] + last[p];
+    if (now_w_m2 > 0.0) ratio = std::max(ratio, now_w_m2 / before_w_m2);
+    most_w_m2 = std::max(most_w_m2, now_w_m2);
+  }
+  if (!(ratio < 1.0)) return std::numeric_limits<double>::infinity();
+  return most_w_m2 * ratio * ratio / (1.0 - ratio * ratio);
+}
+
+}  // namespace
+
+double solve_radiosity(const PatchLinks& links, std::span<const double> reflect,
+                       std::span<const double> source_w_m2, std::span<double> radiosity_w_m2) {
+  const std::size_t n = source_w_m2.size();
+  EMIT_CHECK_OP(links.start.size(), ==, n + 1);
+  EMIT_CHECK_OP(reflect.size(), ==, n);
+  EMIT_CHECK_OP(radiosity_w_m2.size(), ==, n);
+  if (n == 0) return 0.0;
+  const double share = most_reflected_frac(links, reflect);
+  // Add up the reflections of one round after the other, until all that follow are below the limit.
+  std::ranges::copy(source_w_m2, radiosity_w_m2.begin());
+  std::vector<double> before(n), round(source_w_m2.begin(), source_w_m2.end()), next(n);
+  double rest_w_m2 = std::numeric_limits<double>::infinity();
+  for (int bounce = 0; bounce < kMostBounces && rest_w_m2 > kRadiosityToleranceWM2; ++bounce) {
+    for_range(n, 256, [&](std::size_t p) {
+      double in_w_m2 = 0.0;
+      for (std::size_t at = links.start[p]; at < links.start[p + 1]; ++at) {
+        in_w_m2 += static_cast<double>(links.links[at].share_frac) * round[links.links[at].patch];
+      }
+      next[p] = reflect[p] * in_w_m2;
+      radiosity_w_m2[p] += next[p];
+    });
+    if (share < 1.0) rest_w_m2 = std::ranges::max(next) * share / (1.0 - share);
+    if (bounce > 0) rest_w_m2 = std::min(rest_w_m2, bound_of_rest_w_m2(before, round, next));
+    before.swap(round);
+    round.swap(next);
+  }
+  return rest_w_m2;
+}
+
+double SceneExchange::incoming(std::span<const double> direct_w_m2, std::span<const double> face_k,
+                               const ExchangeSky& sky, std::span<Incoming> out) const {
   EMIT_CHECK_OP(direct_w_m2.size(), ==, patch_.size());
   EMIT_CHECK_OP(face_k.size(), ==, patch_.size());
   EMIT_CHECK_OP(out.size(), ==, patch_.size());
-  // Start with the direct sun and the emission of the patches.
+  // Start with the emission of the patches, and with the reflections of sun, sky and surroundings.
   const std::size_t n = patches();
   const std::vector<double> direct = patch_means(direct_w_m2);
   std::vector<double> emitted(face_k.size());
@@ -176,24 +242,19 @@ void SceneExchange::incoming(std::span<const double> direct_w_m2, std::span<cons
     emitted[f] = emissivity_[f] * physics::kStefanBoltzmannWPerM2K4 * fourth(face_k[f]);
   });
   const std::vector<double> own_long = patch_means(emitted);
-  std::vector<double> short_w(n, 0.0), long_w(n, 0.0), next_short(n), next_long(n);
-  // Follow the reflections between patches, J_sw and J_lw of physics.md eq. 20.
-  for (int bounce = 0; bounce < kBounces; ++bounce) {
-    for_range(n, 256, [&](std::size_t p) {
-      double in_short =
-          direct[p] + patch_sky_[p] * sky.diffuse_w_m2 + patch_ground_[p] * sky.ground_short_w_m2;
-      double in_long = patch_sky_[p] * sky.longwave_w_m2 + patch_ground_[p] * sky.ground_long_w_m2;
-      for (std::size_t at = patch_link_start_[p]; at < patch_link_start_[p + 1]; ++at) {
-        const Link& link = patch_links_[at];
-        in_short += static_cast<double>(link.share_frac) * short_w[link.patch];
-        in_long += static_cast<double>(link.share_frac) * long_w[link.patch];
-      }
-      next_short[p] = patch_reflect_[p] * in_short;
-      next_long[p] = own_long[p] + (1.0 - patch_emissivity_[p]) * in_long;
-    });
-    short_w.swap(next_short);
-    long_w.swap(next_long);
-  }
+  std::vector<double> reflect_long(n), source_short(n), source_long(n), short_w(n), long_w(n);
+  for_range(n, 8192, [&](std::size_t p) {
+    reflect_long[p] = 1.0 - patch_emissivity_[p];
+    source_short[p] = patch_reflect_[p] * (direct[p] + patch_sky_[p] * sky.diffuse_w_m2 +
+                                           patch_ground_[p] * sky.ground_short_w_m2);
+    source_long[p] = own_long[p] + reflect_long[p] * (patch_sky_[p] * sky.longwave_w_m2 +
+                                                      patch_ground_[p] * sky.ground_long_w_m2);
+  });
+  // Solve for the radiosities J_sw and J_lw of physics.md eq. 20.
+  const PatchLinks links_of_patches{patch_link_start_, patch_links_};
+  const double left_w_m2 =
+      std::max(solve_radiosity(links_of_patches, patch_reflect_, source_short, short_w),
+               solve_radiosity(links_of_patches, reflect_long, source_long, long_w));
   // Collect the radiosity that every face sees.
   for_range(out.size(), 4096, [&](std::size_t f) {
     Incoming in{sky_frac_[f] * sky.diffuse_w_m2 + ground_frac_[f] * sky.ground_short_w_m2,
@@ -204,6 +265,7 @@ void SceneExchange::incoming(std::span<const double> direct_w_m2, std::span<cons
     }
     out[f] = in;
   });
+  return left_w_m2;
 }
 
 SunOnFaces::SunOnFaces(std::span<const SolidFace> faces, std::span<const ExchangeFace> surfaces)

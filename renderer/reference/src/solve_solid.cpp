@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "solve_solid.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -232,8 +234,9 @@ void SolidHistory::drive(double time_s, std::span<const double> face_k, const Fa
                       std::max(0.0, glm::dot(surfaces_[f].normal, to_sun));
   }
   // Compute the radiation between the faces.
-  exchange_->incoming(direct_w_m2_, face_k,
-                      exchange_sky(now, climate_.surroundings_reflectance_frac()), incoming_);
+  const double left_w_m2 = exchange_->incoming(
+      direct_w_m2_, face_k, exchange_sky(now, climate_.surroundings_reflectance_frac()), incoming_);
+  exchange_left_w_m2_ = std::max(exchange_left_w_m2_, left_w_m2);
   // Set the drive of every face.
   const double cavity4 = std::pow(model_->cavity_k(), 4);
   for (std::size_t f = 0; f < n; ++f) {
@@ -248,12 +251,20 @@ void SolidHistory::drive(double time_s, std::span<const double> face_k, const Fa
 }
 
 Result<void> SolidHistory::advance(double to_s, const std::function<bool(double)>& after_step) {
-  return solver_->advance(
+  auto advanced = solver_->advance(
       to_s,
       [this](double time_s, std::span<const double> face_k, const FaceDrive& out) {
         drive(time_s, face_k, out);
       },
       after_step);
+  if (advanced && exchange_left_w_m2_ > kRadiosityToleranceWM2) {
+    return physics::make_error(
+        physics::ErrorCode::invalid_argument,
+        fmt::format("reflections between faces do not fade: {:.3g} W/m2 are left. Some material "
+                    "absorbs nothing and encloses others",
+                    exchange_left_w_m2_));
+  }
+  return advanced;
 }
 
 Result<void> SolidHistory::restore(const SolidState& state, const SolidStats& spin_up) {

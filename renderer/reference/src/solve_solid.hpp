@@ -69,6 +69,7 @@ class SolidHistory {
   std::unique_ptr<SunOnFaces> sun_;
   std::vector<double> sun_frac_, direct_w_m2_;
   std::vector<Incoming> incoming_;
+  double exchange_left_w_m2_ = 0.0;  ///< greatest result of SceneExchange::incoming()
   SolidStats spin_up_stats_;
 };
 

@@ -13,7 +13,7 @@
 /// Radiation between the faces of a voxel model, the sky and the surroundings. Faces are gathered
 /// into patches of about 20 cm that radiate evenly; every face sees the patches by rays of its own.
 /// Short-wave and long-wave radiation are diffuse, and reflections between patches are followed
-/// until they fade.
+/// until what is left is below kRadiosityToleranceWM2.
 namespace emit::reference {
 
 /// Place and optics of a face for the exchange.
@@ -41,6 +41,29 @@ struct ExchangeSky {
   double ground_long_w_m2 = 0.0;  ///< long-wave radiosity of the same
 };
 
+/// Share of a face's hemisphere that shows a patch.
+struct PatchLink {
+  std::uint32_t patch = 0;
+  float share_frac = 0.0F;
+};
+/// Links of all patches, one patch after the other: those of patch p are links[start[p]] to
+/// links[start[p + 1] - 1].
+struct PatchLinks {
+  std::span<const std::size_t> start;
+  std::span<const PatchLink> links;
+};
+
+/// Reflections that solve_radiosity() leaves out, W/m2.
+inline constexpr double kRadiosityToleranceWM2 = 1e-3;
+
+/// Solves J_p = source_p + reflect_p sum_q F_pq J_q by adding up reflections. Returns a bound of
+/// the radiosity that is left out of any patch, W/m2. It is at most kRadiosityToleranceWM2 unless
+/// next to nothing absorbs.
+/// @pre one entry per patch; shares and reflectances are at most 1, sources at least 0
+[[nodiscard]] double solve_radiosity(const PatchLinks& links, std::span<const double> reflect,
+                                     std::span<const double> source_w_m2,
+                                     std::span<double> radiosity_w_m2);
+
 /// Exchange of radiation in a scene. It is immutable after creation; any number of threads may ask.
 class SceneExchange {
  public:
@@ -50,10 +73,10 @@ class SceneExchange {
                 const FaceFinder& finder, const SceneInstant& scene, std::uint32_t rays);
 
   /// Computes the irradiance of every face. `direct_w_m2` is the direct sun on each face, `face_k`
-  /// its temperature.
+  /// its temperature. Returns the reflections that are left out, W/m2, as solve_radiosity() does.
   /// @pre direct_w_m2, face_k and out have one entry per face.
-  void incoming(std::span<const double> direct_w_m2, std::span<const double> face_k,
-                const ExchangeSky& sky, std::span<Incoming> out) const;
+  [[nodiscard]] double incoming(std::span<const double> direct_w_m2, std::span<const double> face_k,
+                                const ExchangeSky& sky, std::span<Incoming> out) const;
 
   /// Cosine-weighted share of a face's hemisphere that is sky.
   [[nodiscard]] double sky_frac(std::size_t face) const noexcept { return sky_frac_[face]; }
@@ -61,11 +84,7 @@ class SceneExchange {
   [[nodiscard]] double ground_frac(std::size_t face) const noexcept { return ground_frac_[face]; }
   [[nodiscard]] std::size_t patches() const noexcept { return patch_area_m2_.size(); }
 
-  /// Share of a face's hemisphere that shows a patch.
-  struct Link {
-    std::uint32_t patch = 0;
-    float share_frac = 0.0F;
-  };
+  using Link = PatchLink;
   [[nodiscard]] std::span<const Link> links(std::size_t face) const noexcept {
     return {links_.data() + link_start_[face], link_start_[face + 1] - link_start_[face]};
   }
