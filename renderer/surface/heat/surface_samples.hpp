@@ -62,7 +62,8 @@ struct SurfaceSample {
   std::array<float, physics::kMaxFosterModes> open_before_frac{1.0F, 1.0F, 1.0F, 1.0F};
   /// Sample of the other face of a sheet at the same place, which shares the state of this one.
   std::uint32_t other_side = kNoSample;
-  float flat_m = 0.0F;  ///< the surface is plane at least this far in all directions
+  float flat_m = 0.0F;   ///< the surface is plane at least this far in all directions
+  float facet_m = 0.0F;  ///< longest edge of the triangles on which it lies, before any is halved
   std::array<Partner, kMaxPartners> partners{};
 };
 

@@ -231,9 +231,16 @@ std::uint32_t CasterRays::blocked_moving(std::size_t entity,
   return near == 0 ? 0 : body.set.occluded({inside.data(), rays.size()}, near);
 }
 
-std::uint32_t CasterRays::blocked_in_body(std::size_t entity,
-                                          std::span<const CasterRay> rays) const noexcept {
-  return blocked_entity(entity, EntityPlacement{}, rays);
+std::uint32_t CasterRays::blocked_in_body(std::size_t entity, std::span<const CasterRay> rays,
+                                          std::uint32_t wanted) const noexcept {
+  EMIT_DCHECK_OP(rays.size(), <=, kMaxRays);
+  const Impl::Entity& body = impl_->entities[entity];
+  const glm::vec3 centre_m(body.centre_body_m);
+  Packet inside;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    inside[i] = {rays[i].origin_m - centre_m, rays[i].direction};
+  }
+  return body.set.occluded({inside.data(), rays.size()}, all_of(rays) & wanted);
 }
 
 std::uint32_t CasterRays::blocked(std::span<const CasterRay> rays,

@@ -115,8 +115,8 @@ class CasterRays {
                                              std::uint32_t wanted = kAllRays) const noexcept;
   /// Returns the same bits for rays in the axes of the body of an entity, relative to the origin of
   /// the body. This tells how an entity shades itself, without the rounding of a far-off placement.
-  [[nodiscard]] std::uint32_t blocked_in_body(std::size_t entity,
-                                              std::span<const CasterRay> rays) const noexcept;
+  [[nodiscard]] std::uint32_t blocked_in_body(std::size_t entity, std::span<const CasterRay> rays,
+                                              std::uint32_t wanted = kAllRays) const noexcept;
 
   /// Returns the same bits for everything that is selected.
   [[nodiscard]] std::uint32_t blocked(std::span<const CasterRay> rays,

@@ -12,6 +12,7 @@
 #include "emit/physics/constants.hpp"
 #include "history/step_plan.hpp"
 #include "surface/mesh/tangents.hpp"
+#include "surface/rays/ray_offsets.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -205,6 +206,7 @@ IntervalRays::Spots IntervalRays::send(const CasterRays& rays, const SurfaceSamp
                                        std::span<const glm::vec3> starts_m,
                                        std::size_t first) const noexcept {
   std::array<CasterRay, kPacketRays> sent;
+  std::array<CasterRay, kPacketRays> in_body;
   Spots spots;
   // Aim the rays of those points whose face looks towards the sun at their instant.
   for (std::size_t k = 0; k < starts_m.size(); ++k) {
@@ -213,8 +215,12 @@ IntervalRays::Spots IntervalRays::send(const CasterRays& rays, const SurfaceSamp
     glm::vec3 start_m = starts_m[k];
     if (face.entity >= 0) {
       const EntityPlacement& place = placed(static_cast<std::size_t>(face.entity), ray);
+      // Trace the own hull in the axes of the body, because float32 loses it where the body is far
+      // off. Lift the start for everything else by what is lost there.
+      in_body[k] = {start_m, direction_[ray] * place.rel_from_body};
       n = place.rel_from_body * n;
       start_m = place.rel_from_body * start_m + place.position_m;
+      start_m += ray_rounding_m(start_m) * n;
     }
     if (!(glm::dot(n, direction_[ray]) > 0.0F)) continue;
     spots.faced |= 1U << k;
@@ -226,7 +232,12 @@ IntervalRays::Spots IntervalRays::send(const CasterRays& rays, const SurfaceSamp
   spots.open = spots.faced & ~rays.blocked_static(packet, spots.faced);
   spots.lit = spots.open;
   if (!any_entity_on_) return spots;
-  // Trace those that are left against the entities whose ball they may hit.
+  // Trace those that are left against the own hull, and against the entities whose ball they may
+  // hit.
+  const auto own = static_cast<std::size_t>(face.entity);
+  if (face.entity >= 0 && placed(own, first).on) {
+    spots.lit &= ~rays.blocked_in_body(own, {in_body.data(), starts_m.size()}, spots.lit);
+  }
   const glm::vec3& from_m = sent[static_cast<std::size_t>(std::countr_zero(spots.faced))].origin_m;
   float apart_m = 0.0F;
   for (std::size_t k = 0; k < packet.size(); ++k) {
@@ -234,6 +245,7 @@ IntervalRays::Spots IntervalRays::send(const CasterRays& rays, const SurfaceSamp
     apart_m = std::max(apart_m, glm::distance(packet[k].origin_m, from_m));
   }
   for (std::size_t m = 0; m < entity_radius_m_.size() && spots.lit != 0; ++m) {
+    if (static_cast<std::int64_t>(m) == face.entity) continue;
     if (!comes_near(from_m, apart_m, m, first / kPacketRays)) continue;
     spots.lit &= ~rays.blocked_moving(m, placed_in_packet(m, first), packet, spots.lit);
   }

@@ -66,10 +66,14 @@ bool seen_wide(const std::array<glm::vec3, 3>& corners_m, std::span<const glm::v
 
 /// Returns whether the sun reaches the centre of the triangle from any of the directions.
 bool lit(const std::array<glm::vec3, 3>& corners_m, std::span<const glm::vec3> to_suns,
-         const RayOffsets& offsets, const CasterRays& rays) {
+         const CasterRays& rays) {
   const glm::vec3 across_m2 = glm::cross(corners_m[1] - corners_m[0], corners_m[2] - corners_m[0]);
   const glm::vec3 centre_m = (corners_m[0] + corners_m[1] + corners_m[2]) / 3.0F;
-  const glm::vec3 start_m = centre_m + offsets.at(centre_m).sun_m * glm::normalize(across_m2);
+  const float facet_m = std::max({glm::distance(corners_m[0], corners_m[1]),
+                                  glm::distance(corners_m[1], corners_m[2]),
+                                  glm::distance(corners_m[2], corners_m[0])});
+  const glm::vec3 start_m =
+      centre_m + ray_offsets(centre_m, facet_m).sun_m * glm::normalize(across_m2);
   return std::ranges::any_of(to_suns, [&](const glm::vec3& to_sun) {
     const CasterRay ray{start_m, to_sun};
     return glm::dot(across_m2, to_sun) > 0.0F && rays.blocked_static({&ray, 1}) == 0U;
@@ -84,7 +88,6 @@ std::vector<std::vector<bool>> kept_facets(const scene::SceneGeometry& geometry,
                                            std::span<const glm::vec3> to_suns) {
   const std::vector<glm::vec3> eyes_m = some_eyes(view, rays.origin_world_m());
   const auto pixel_rad = static_cast<float>(view.pixel_rad);
-  const RayOffsets offsets = ray_offsets(geometry);
   std::vector<std::vector<bool>> kept(geometry.meshes.size());
   std::vector<std::vector<std::uint8_t>> at_vertex(geometry.meshes.size());
   const auto corners = [](const scene::Mesh& mesh, std::size_t triangle) {
@@ -111,7 +114,7 @@ std::vector<std::vector<bool>> kept_facets(const scene::SceneGeometry& geometry,
         }
         if (mirrored) std::swap(corners_m[1], corners_m[2]);
         const bool pays =
-            seen_wide(corners_m, eyes_m, pixel_rad, rays) && lit(corners_m, to_suns, offsets, rays);
+            seen_wide(corners_m, eyes_m, pixel_rad, rays) && lit(corners_m, to_suns, rays);
         if (pays) keep[t] = 1;
       }
     });

@@ -16,8 +16,7 @@ SurfaceGeometry::SurfaceGeometry(scene::SceneGeometry geometry,
     : geometry_(std::move(geometry)),
       entity_of_object_(std::move(entity_of_object)),
       places_(std::move(places)),
-      detail_(std::move(detail)),
-      offsets_(ray_offsets(geometry_)) {}
+      detail_(std::move(detail)) {}
 
 physics::Result<SurfaceGeometry> SurfaceGeometry::create(const scene::ScenarioDesc& scenario,
                                                          scene::SceneGeometry geometry,

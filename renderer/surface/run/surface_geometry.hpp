@@ -11,7 +11,6 @@
 #include "emit/scene/mesh.hpp"
 #include "emit/scene/scene_desc.hpp"
 #include "surface/rays/caster_rays.hpp"
-#include "surface/rays/ray_offsets.hpp"
 #include "surface/rays/surface_detail.hpp"
 
 namespace emit::renderer {
@@ -51,7 +50,6 @@ class SurfaceGeometry {
   [[nodiscard]] const SurfaceDetail* detail() const noexcept {
     return detail_ ? &*detail_ : nullptr;
   }
-  [[nodiscard]] const RayOffsets& offsets() const noexcept { return offsets_; }
   /// Origin of rel in the world, m.
   [[nodiscard]] const glm::dvec3& origin_world_m() const noexcept {
     return rays().origin_world_m();
@@ -65,7 +63,6 @@ class SurfaceGeometry {
   std::vector<std::int32_t> entity_of_object_;
   CasterRays places_;
   std::optional<SurfaceDetail> detail_;
-  RayOffsets offsets_;
 };
 
 }  // namespace emit::renderer

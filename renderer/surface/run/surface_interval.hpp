@@ -65,7 +65,7 @@ class SurfaceInterval {
   [[nodiscard]] const HeatInterval& heat_interval() const noexcept { return interval_; }
   /// Input that all steps share in this interval.
   [[nodiscard]] SurfaceStep step(const SurfaceSamples& all) const noexcept {
-    return {all, heat_, geometry_.rays(), geometry_.offsets(), faces_};
+    return {all, heat_, geometry_.rays(), faces_};
   }
 
  private:

@@ -6,6 +6,7 @@
 
 #include "emit/physics/check.hpp"
 #include "surface/heat/view_of_now.hpp"
+#include "surface/rays/ray_offsets.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -96,15 +97,7 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
   EMIT_DCHECK(steps_itself(step.all, index));
   const ViewedSample viewed(step, interval_rays, step.all.samples[index]);
   const SurfaceSample& sample = viewed.sample();
-  // Take ray offsets for the place of the sample, of an entity for where it stands now.
-  RayOffsets offsets = step.offsets;
-  if (sample.entity < 0) {
-    offsets = offsets.at(sample.position_m);
-  } else if (const EntityPlacement& place =
-                 interval_rays.placement(static_cast<std::size_t>(sample.entity));
-             place.on) {
-    offsets = offsets.at(place.rel_from_body * sample.position_m + place.position_m);
-  }
+  const RayOffsets offsets = ray_offsets(sample.position_m, sample.facet_m);
   const auto sun_of = [&](const SurfaceSample& side) {
     return interval_rays.sun_share(step.rays, side, offsets.sun_m, 0.0F);
   };

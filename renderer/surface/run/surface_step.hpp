@@ -10,7 +10,6 @@
 #include "surface/model/entity_exitance.hpp"
 #include "surface/rays/caster_rays.hpp"
 #include "surface/rays/interval_rays.hpp"
-#include "surface/rays/ray_offsets.hpp"
 
 namespace emit::renderer {
 
@@ -22,7 +21,6 @@ struct SurfaceStep {
   const SurfaceSamples& all;
   const SampleHeat& heat;
   const CasterRays& rays;
-  RayOffsets offsets;
   std::span<const EntityFaces> faces;  ///< by entity; if empty, entities send what surroundings do
 };
 

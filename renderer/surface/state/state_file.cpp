@@ -79,7 +79,8 @@ void visit_members(T& s, const Visit& visit) {
       visit(s.sphere_sky_frac), visit(s.hull_open_frac), visit(s.hull_tilt_frac);
   visit(s.far_frac), visit(s.first_seen), visit(s.seen_count), visit(s.seen_scale);
   visit(s.covered);
-  visit(s.open_frac), visit(s.open_before_frac), visit(s.flat_m), visit(s.partners);
+  visit(s.open_frac), visit(s.open_before_frac), visit(s.flat_m), visit(s.facet_m);
+  visit(s.partners);
   visit(s.other_side);
 }
 template <class T, class Visit>

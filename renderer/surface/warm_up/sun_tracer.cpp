@@ -5,23 +5,15 @@
 #include <cmath>
 
 #include "emit/physics/check.hpp"
+#include "surface/rays/ray_offsets.hpp"
 
 namespace emit::renderer {
 
 SunTracer::SunTracer(const SurfaceInputs& inputs, const SurfaceModelOptions& options)
-    : in_(inputs),
-      offsets_(ray_offsets(inputs.geometry)),
-      lateral_(options.lateral),
-      max_blur_m_(static_cast<float>(options.max_blur_m)) {
+    : in_(inputs), lateral_(options.lateral), max_blur_m_(static_cast<float>(options.max_blur_m)) {
   for (const scene::Material& material : inputs.materials) {
     diffusivity_m2_s_.push_back(static_cast<float>(diffusivity_m2_s(material)));
   }
-}
-
-RayOffsets SunTracer::offsets(const glm::vec3& place_m, std::int32_t entity) const noexcept {
-  if (entity < 0) return offsets_.at(place_m);
-  const EntityPlacement& place = in_.entities_now[static_cast<std::size_t>(entity)];
-  return place.on ? offsets_.at(place.rel_from_body * place_m + place.position_m) : offsets_;
 }
 
 void SunTracer::trace(const SurfaceSample& sample, std::span<float> sun_frac,
@@ -29,7 +21,7 @@ void SunTracer::trace(const SurfaceSample& sample, std::span<float> sun_frac,
   const HistoryRecord& record = in_.record;
   EMIT_DCHECK_OP(sun_frac.size(), ==, record.size());
   EMIT_DCHECK(hidden_sky.empty() || hidden_sky.size() == record.size());
-  const RayOffsets offsets = this->offsets(sample.position_m, sample.entity);
+  const RayOffsets offsets = ray_offsets(sample.position_m, sample.facet_m);
   // Limit the blur to half of the way over which the surface is a plane: rays must not start beyond
   // an edge.
   const float max_blur_m = lateral_ ? std::min(max_blur_m_, 0.5F * sample.flat_m) : 0.0F;

@@ -14,6 +14,8 @@
 #include "surface/mesh/refined_mesh_edges.hpp"
 #include "surface/mesh/sheet_sides.hpp"
 #include "surface/model/surface_model.hpp"
+#include "surface/rays/ray_offsets.hpp"
+#include "surface/warm_up/facet_edges.hpp"
 #include "surface/warm_up/sample_numbers.hpp"
 #include "surface/warm_up/surface_exchange.hpp"
 #include "surface/warm_up/surface_partners.hpp"
@@ -142,10 +144,11 @@ class Builder {
   SurfaceModel model_;
   std::vector<SurfacePatch> patches_;
   std::vector<std::vector<std::uint32_t>> patches_of_mesh_;
-  std::size_t sample_count_ = 0;   ///< samples of all patches, partners included
-  std::size_t partner_count_ = 0;  ///< partners among these
-  std::size_t least_count_ = 0;    ///< samples before anything is refined
-  bool short_of_samples_ = false;  ///< leaves stayed whole in this round, because samples ran out
+  std::size_t sample_count_ = 0;    ///< samples of all patches, partners included
+  std::size_t partner_count_ = 0;   ///< partners among these
+  std::size_t least_count_ = 0;     ///< samples before anything is refined
+  bool short_of_samples_ = false;   ///< leaves stayed whole in this round, because samples ran out
+  std::vector<FacetEdges> facets_;  ///< by mesh
   // Arrays by vertex of the mesh at hand, filled for the vertices that have no sample yet.
   std::vector<glm::vec3> inward_;
   std::vector<glm::vec3> place_m_;  ///< place of the samples of the vertex, axes of the mesh
@@ -158,6 +161,7 @@ class Builder {
 
 void Builder::make_patches() {
   patches_of_mesh_.resize(model_.meshes.size());
+  facets_.resize(model_.meshes.size());
   for (const scene::Instance& instance : in_.geometry.instances) {
     SurfacePatch patch;
     patch.mesh = instance.mesh;
@@ -222,6 +226,7 @@ bool Builder::sample_new_vertices() {
       if (!looked) {
         find_inward(model_.meshes[mesh], first, inward_);
         adopt_detail(mesh, first);
+        facets_[mesh].grow(model_.meshes[mesh]);
       }
       looked = true;
       patch.grow(vertices.size());
@@ -234,8 +239,8 @@ bool Builder::sample_new_vertices() {
         const float length = glm::length(inward);
         const glm::vec3 unit_inward = length > 0.0F ? inward / length : glm::vec3(0.0F);
         const glm::vec3 drawn_m(patch.rel_from_mesh * glm::vec4(vertices[v].position_m, 1.0F));
-        const glm::vec3 off_edge_m =
-            sampler_.tracer().offsets(drawn_m, patch.entity).around_m * unit_inward;
+        sample.facet_m = patch.greatest_scale() * facets_[mesh].longest_m(v);
+        const glm::vec3 off_edge_m = ray_offsets(drawn_m, sample.facet_m).around_m * unit_inward;
         const auto to_rel = [&](const glm::vec3& at_m) {
           return glm::vec3(patch.rel_from_mesh * glm::vec4(at_m, 1.0F)) + off_edge_m;
         };

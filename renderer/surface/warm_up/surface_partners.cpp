@@ -11,6 +11,7 @@
 
 #include "emit/physics/check.hpp"
 #include "emit/threads/parallel.hpp"
+#include "surface/rays/ray_offsets.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -83,7 +84,7 @@ void PartnerFinder::find(std::size_t patch, std::uint32_t vertex, const SurfaceS
   }
   // Take the offset of the place in the body's axes: float32 resolves more there than where the
   // body stands.
-  const float offset_m = sampler_.tracer().offsets(own.position_m, -1).around_m;
+  const float offset_m = ray_offsets(own.position_m, own.facet_m).around_m;
   const ViewPoint point{own.position_m, own.normal, glm::vec3(0.0F), offset_m};
   const AdjacentFaces adjacent = adjacent_faces(in_.places, point, reach_m, selection);
   for (std::uint32_t k = 0; k < adjacent.count && partners.size() < kMaxPartners; ++k) {
@@ -108,6 +109,7 @@ void PartnerFinder::find(std::size_t patch, std::uint32_t vertex, const SurfaceS
     found.sample.position_m = at_m;
     found.sample.normal = m;
     found.sample.entity = own.entity;
+    found.sample.facet_m = own.facet_m;
     found.sample.material = own.material;
     for (const scene::Submesh& submesh : mesh.submeshes) {
       if (3 * hit[0].triangle >= submesh.first_index &&

@@ -14,6 +14,7 @@
 #include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
 #include "surface/mesh/tangents.hpp"
+#include "surface/rays/ray_offsets.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -129,8 +130,12 @@ void PatchSampler::look_around(SurfacePatch& patch, std::uint32_t index,
       sample.entity >= 0 &&
       glm::length(in_.entities_now[static_cast<std::size_t>(sample.entity)].position_m) >
           kMaxWorldM;
-  const float offset_m = far_off ? tracer_.bulk_offsets().around_m
-                                 : tracer_.offsets(sample.position_m, sample.entity).around_m;
+  float offset_m = ray_offsets(sample.position_m, sample.facet_m).around_m;
+  if (sample.entity >= 0 && !far_off) {
+    const EntityPlacement& stands = in_.entities_now[static_cast<std::size_t>(sample.entity)];
+    offset_m = std::max(
+        offset_m, ray_rounding_m(stands.rel_from_body * sample.position_m + stands.position_m));
+  }
   ViewPoint point{sample.position_m, sample.normal, stand.inward, offset_m};
   ViewPoint drawn{stand.drawn_m, sample.normal, stand.inward, offset_m};
   std::array<EntityPlacement, 1> self;

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <glm/ext/matrix_float3x3.hpp>
 #include <glm/ext/matrix_float4x4.hpp>
+#include <glm/geometric.hpp>
 #include <memory>
 #include <optional>
 #include <span>
@@ -56,6 +58,12 @@ struct SurfacePatch {
   /// Patch of the other faces of sheets, with the same vertices; null if the mesh has no sheets.
   std::unique_ptr<SurfacePatch> back;
 
+  /// Length by which `rel_from_mesh` stretches an axis of the mesh at most.
+  [[nodiscard]] float greatest_scale() const noexcept {
+    return std::max({glm::length(glm::vec3(rel_from_mesh[0])),
+                     glm::length(glm::vec3(rel_from_mesh[1])),
+                     glm::length(glm::vec3(rel_from_mesh[2]))});
+  }
   /// Sets the number of intervals that rows hold, whether there are entities, and whether `sent`
   /// is stored. @pre the patch has no vertices
   void begin(std::size_t intervals, bool entities, bool keeps_sent);

@@ -109,7 +109,6 @@ SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs,
       pixel_rad_(static_cast<float>(view.pixel_rad)),
       field_rad_(static_cast<float>(view.field_rad)),
       tolerance_k_(static_cast<float>(options.tolerance_k)),
-      offsets_(ray_offsets(inputs.geometry)),
       lateral_(options.lateral),
       judged_(inputs.geometry.meshes.size()) {
   for (const scene::Material& material : inputs.materials) {
@@ -137,7 +136,8 @@ SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs,
 }
 
 SurfaceRefinement::Width SurfaceRefinement::width(const std::array<glm::vec3, 3>& corners_m,
-                                                  float longest_m, float body_m,
+                                                  const glm::vec3& origin_m, float longest_m,
+                                                  float body_m,
                                                   std::span<const Eye> eyes) const noexcept {
   constexpr float kMinM = 1e-6F;
   const glm::vec3 centre_m = (corners_m[0] + corners_m[1] + corners_m[2]) / 3.0F;
@@ -146,7 +146,7 @@ SurfaceRefinement::Width SurfaceRefinement::width(const std::array<glm::vec3, 3>
   Width width;
   float least_px_m = std::numeric_limits<float>::infinity();
   for (const Eye& eye : eyes) {
-    const glm::vec3 way_m = centre_m - eye.rel_m;
+    const glm::vec3 way_m = centre_m + (origin_m - eye.rel_m);
     const float distance_m = std::max(glm::length(way_m), kMinM);
     const float px_m = std::max(pixel_rad_ * distance_m, kMinM);
     least_px_m = std::min(least_px_m, px_m);
@@ -249,8 +249,8 @@ float SurfaceRefinement::missed_shade_k(const RefinedMesh& refined, std::uint32_
     }
     points_m[k] = (1.0F - u - v) * a.position_m + u * b.position_m + v * c.position_m;
   }
-  float sun_offset_m = offsets_.sun_m;
-  if (patch.entity < 0) sun_offset_m = offsets_.at(a.position_m).sun_m;
+  const float facet_m = std::max({a.facet_m, b.facet_m, c.facet_m});
+  const float sun_offset_m = ray_offsets(a.position_m, facet_m).sun_m;
   std::array<float, kPacketRays> missed_k{};
   for (std::size_t i = 0; i < count; ++i) {
     const IntervalRays& rays = in_.record.rays[i];
@@ -279,13 +279,17 @@ SurfaceRefinement::Judged SurfaceRefinement::need(const RefinedMesh& refined, st
                                                   const SurfacePatch& patch, float body_m) const {
   const auto& leaf = refined.leaf(slot);
   const auto vertices = refined.vertices();
+  // Hold the corners of an entity relative to the origin of its body: far off, float32 would not
+  // resolve their edges.
   std::array<glm::vec3, 3> corners_m;
+  glm::vec3 origin_m(0.0F);
   for (std::size_t i = 0; i < 3; ++i) {
     // Take the vertices, because the samples' own places are moved off edges.
     corners_m[i] = glm::vec3(patch.rel_from_mesh * glm::vec4(vertices[leaf[i]].position_m, 1.0F));
     if (patch.entity >= 0) {
       const EntityPlacement& place = in_.entities_now[static_cast<std::size_t>(patch.entity)];
-      corners_m[i] = place.rel_from_body * corners_m[i] + place.position_m;
+      corners_m[i] = place.rel_from_body * corners_m[i];
+      origin_m = place.position_m;
     }
   }
   const float longest_m = std::max({glm::distance(corners_m[0], corners_m[1]),
@@ -294,7 +298,7 @@ SurfaceRefinement::Judged SurfaceRefinement::need(const RefinedMesh& refined, st
   const auto entity = static_cast<std::size_t>(patch.entity);
   const bool goes = patch.entity >= 0 && entity < eyes_of_entity_.size();
   const Width width =
-      this->width(corners_m, longest_m, body_m, goes ? eyes_of_entity_[entity] : eyes_);
+      this->width(corners_m, origin_m, longest_m, body_m, goes ? eyes_of_entity_[entity] : eyes_);
   const float edge_px = width.finer * width.edge_px;
   Judged judged{refined.node(slot), 0.0F, width.in_view_px > 0.0F};
   // Leave alone what is narrow enough, and what has a prescribed temperature.

@@ -81,8 +81,10 @@ class SurfaceRefinement {
     float anywhere_px = 0.0F;
     float finer = 1.0F;
   };
-  [[nodiscard]] Width width(const std::array<glm::vec3, 3>& corners_m, float longest_m,
-                            float body_m, std::span<const Eye> eyes) const noexcept;
+  /// The corners are relative to `origin_m`, in the axes of rel.
+  [[nodiscard]] Width width(const std::array<glm::vec3, 3>& corners_m, const glm::vec3& origin_m,
+                            float longest_m, float body_m,
+                            std::span<const Eye> eyes) const noexcept;
   /// Range of temperature of the corners, K, if sunlight fell unequally on them of late; else 0.
   [[nodiscard]] float shadow_edge_k(const RefinedMesh& refined, std::uint32_t slot,
                                     const SurfacePatch& patch) const;
@@ -102,7 +104,6 @@ class SurfaceRefinement {
   float pixel_rad_ = 1e-3F;
   float field_rad_ = 0.0F;
   float tolerance_k_ = 0.1F;
-  RayOffsets offsets_;
   bool lateral_ = true;
   std::vector<float> diffusivity_m2_s_;  ///< diffusivity of the first layer, by material
   std::size_t recent_ = 0;               ///< first interval that counts as recent

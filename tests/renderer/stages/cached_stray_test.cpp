@@ -2,6 +2,9 @@
 // Geometry that is far away changes nothing that is near.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "support/cached_session.hpp"
 #include "support/renderer_scene.hpp"
 
@@ -66,6 +69,69 @@ TEST(RendererStray, AFewTrianglesFarAwayChangeNothing) {
     with.push_back({place_m, place_m + glm::dvec3(1.0, 0.0, 0.0),
                     place_m + glm::dvec3(1.0, 1.0, 0.0), place_m + glm::dvec3(0.0, 1.0, 0.0)});
     expect_alike(clean, seen(cached_scenario(write_quads("stray", with))));
+  }
+}
+
+/// Rectangle of ground between two corners.
+Quad level(const glm::dvec2& low, const glm::dvec2& high) {
+  return {{low.x, low.y, 0.0}, {high.x, low.y, 0.0}, {high.x, high.y, 0.0}, {low.x, high.y, 0.0}};
+}
+
+/// Four rectangles of ground around the square from -inner_m to inner_m.
+void add_frame(std::vector<Quad>& quads, double inner_m, double outer_m) {
+  quads.push_back(level({-outer_m, -outer_m}, {outer_m, -inner_m}));
+  quads.push_back(level({-outer_m, inner_m}, {outer_m, outer_m}));
+  quads.push_back(level({-outer_m, -inner_m}, {-inner_m, inner_m}));
+  quads.push_back(level({inner_m, -inner_m}, {outer_m, inner_m}));
+}
+
+TEST(RendererStray, ACountryAroundTheSceneLeavesItsShadowsAlone) {
+  auto quads = box({-1.0, -1.0, 0.0}, {1.0, 1.0, 2.0});
+  quads.push_back(ground(20.0, 20.0));
+  add_frame(quads, 20.0, 400.0);
+  const Seen near = seen(cached_scenario(write_quads("near", quads)));
+  // Add tiles of 25 km, so many that they are the bulk of the scene.
+  constexpr double kTileM = 25e3;
+  add_frame(quads, 400.0, kTileM);
+  for (int i = -6; i < 6; ++i) {
+    for (int j = -6; j < 6; ++j) {
+      if (std::abs(i + 0.5) < 1.0 && std::abs(j + 0.5) < 1.0) continue;
+      const glm::dvec2 low(kTileM * i, kTileM * j);
+      quads.push_back(level(low, low + kTileM));
+    }
+  }
+  const Seen wide = seen(cached_scenario(write_quads("wide", quads)));
+  const Difference off = difference(near.frame_k, wide.frame_k);
+  RecordProperty("max_mk", static_cast<int>(1e3 * off.max_k));
+  EXPECT_LT(off.p99_k, 0.05);
+  EXPECT_LT(off.max_k, 0.5);
+}
+
+TEST(RendererStray, AnEntityShadesItselfWhereverItStands) {
+  // The entity is a deck with a wall on it. Beyond 20 km it sees its own hull alone.
+  auto deck = box({-0.3, -2.0, 0.0}, {0.3, 2.0, 1.5});
+  deck.push_back(ground(3.0, 3.0));
+  const auto seen_at = [&](const glm::dvec3& place_m) {
+    auto s = cached_scenario(write_quads("field", {ground(50.0, 50.0)}));
+    scene::ObjectDesc entity = s.objects.front();
+    entity.name = "deck";
+    entity.gltf = write_quads("deck", deck);
+    entity.entity_id = 7;
+    entity.instances.front().position_world_m = place_m;
+    s.objects.push_back(entity);
+    Session run(s);
+    return run.frame_k(3 * kHourNs, looking(place_m + glm::dvec3(3.0, -9.0, 6.0), place_m));
+  };
+  const auto near_k = seen_at({30e3, 0.0, 1e3});
+  const auto [low, high] = std::ranges::minmax_element(near_k, [](float a, float b) {
+    return (std::isnan(a) ? 300.0F : a) < (std::isnan(b) ? 300.0F : b);
+  });
+  ASSERT_GT(*high - *low, 5.0F);  // the shadow of the wall
+  for (const glm::dvec3& place_m :
+       {glm::dvec3(40e3, 0.0, 1e3), glm::dvec3(4e5, 0.0, 1e3), glm::dvec3(-1e5, 8e5, 5e3)}) {
+    const Difference off = difference(near_k, seen_at(place_m));
+    RecordProperty("max_mk", static_cast<int>(1e3 * off.max_k));
+    EXPECT_LT(off.max_k, 1e-3) << place_m.x;
   }
 }
 

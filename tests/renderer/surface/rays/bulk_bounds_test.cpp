@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
+#include <random>
 
 #include "renderer/surface/surface_scene.hpp"
 #include "surface/rays/ray_offsets.hpp"
@@ -57,7 +60,6 @@ TEST(BulkBounds, leave_strays_out_wherever_they_are) {
     EXPECT_LT(glm::length(box.max_m - box.min_m), 300.0);
     EXPECT_GT(glm::length(box.max_m - box.min_m), 80.0);
     EXPECT_LT(glm::length(0.5 * (box.min_m + box.max_m)), 30.0);
-    EXPECT_LT(ray_offsets(scene.geometry).around_m, 6e-4F);
     auto rays = CasterRays::create(scene.geometry);
     ASSERT_TRUE(rays);
     EXPECT_LT(glm::length(rays->origin_world_m()), 30.0);
@@ -83,11 +85,57 @@ TEST(BulkBounds, of_a_scene_with_entities_are_those_of_what_stands_still) {
 }
 
 TEST(RayOffsets, grow_with_the_distance_from_the_origin_where_float32_resolves_less) {
-  const RayOffsets offsets = ray_offsets(street().geometry);
-  EXPECT_EQ(offsets.at(glm::vec3(0.0F)).sun_m, offsets.sun_m);
-  EXPECT_EQ(offsets.at(glm::vec3(60.0F, 60.0F, 2.0F)).sun_m, offsets.sun_m);
-  EXPECT_FLOAT_EQ(offsets.at(glm::vec3(0.0F, 5e6F, 0.0F)).sun_m, 5.0F);
-  EXPECT_FLOAT_EQ(offsets.at(glm::vec3(0.0F, 5e6F, 0.0F)).around_m, 5.0F);
+  EXPECT_EQ(ray_offsets(glm::vec3(0.0F), 4.0F).sun_m, RayOffsets().sun_m);
+  EXPECT_FLOAT_EQ(ray_offsets(glm::vec3(60.0F, 60.0F, 2.0F), 4.0F).sun_m,
+                  1e-6F * std::sqrt(7204.0F));
+  EXPECT_EQ(ray_offsets(glm::vec3(60.0F, 60.0F, 2.0F), 4.0F).around_m, RayOffsets().around_m);
+  EXPECT_FLOAT_EQ(ray_offsets(glm::vec3(0.0F, 5e6F, 0.0F), 4.0F).sun_m, 5.0F);
+  EXPECT_FLOAT_EQ(ray_offsets(glm::vec3(0.0F, 5e6F, 0.0F), 4.0F).around_m, 5.0F);
+  EXPECT_FLOAT_EQ(ray_offsets(glm::vec3(0.0F), 5e5F).around_m, 0.5F);
+}
+
+TEST(RayOffsets, ClearTheTriangleOnWhichAPlaceLiesWhateverItsSizeTiltAndDistance) {
+  // A place on a triangle, as float32 holds it, must not meet the triangle itself.
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> any(-1.0F, 1.0F);
+  for (const float size_m : {1e-2F, 1.0F, 100.0F, 1e4F, 1e6F}) {
+    for (const float away_m : {0.0F, 10.0F, 1e3F, 1e5F}) {
+      int met = 0;
+      for (int i = 0; i < 40; ++i) {
+        const auto somewhere = [&](float reach_m) {
+          return reach_m * glm::vec3(any(random), any(random), any(random));
+        };
+        const glm::vec3 middle_m = somewhere(away_m);
+        scene::Mesh mesh;
+        const glm::vec3 last_m = middle_m + somewhere(size_m);
+        test::add_quad(
+            mesh, {middle_m + somewhere(size_m), middle_m + somewhere(size_m), last_m, last_m});
+        mesh.indices.resize(3);
+        mesh.submeshes.front().index_count = 3;
+        const glm::vec3* p = mesh.positions_m.data();
+        const glm::dvec3 across =
+            glm::cross(glm::dvec3(p[1]) - glm::dvec3(p[0]), glm::dvec3(p[2]) - glm::dvec3(p[0]));
+        const float longest_m = std::max(
+            {glm::distance(p[0], p[1]), glm::distance(p[1], p[2]), glm::distance(p[2], p[0])});
+        if (glm::length(across) < 0.01 * longest_m * longest_m) continue;
+        const glm::vec3 normal(glm::normalize(across));
+        SurfaceScene scene;
+        scene.add_static(mesh);
+        const auto rays = CasterRays::create(scene.geometry, glm::dvec3(0.0));
+        ASSERT_TRUE(rays);
+        for (int k = 0; k < 40; ++k) {
+          const float u = 0.5F * std::abs(any(random));
+          const float v = 0.5F * std::abs(any(random));
+          const glm::vec3 at_m = (1.0F - u - v) * p[0] + u * p[1] + v * p[2];
+          glm::vec3 way = glm::normalize(somewhere(1.0F));
+          if (glm::dot(way, normal) < 0.0F) way = -way;
+          const CasterRay ray{at_m + ray_offsets(at_m, longest_m).sun_m * normal, way};
+          met += static_cast<int>(rays->blocked_static({&ray, 1}));
+        }
+      }
+      EXPECT_EQ(met, 0) << size_m << " m wide, " << away_m << " m away";
+    }
+  }
 }
 
 }  // namespace
