@@ -286,6 +286,7 @@ Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
   scenario.sensor = resolve_sensor(root, diagnostics);
   scenario.objects =
       resolve_objects(root, scenario.materials, options.require_scene_files, diagnostics);
+  scenario.contacts = resolve_contacts(root, scenario.objects, scenario.materials, diagnostics);
   // Channels may be carried by entities.
   check_channels(root, scenario, options.require_scene_files, diagnostics);
   if (!diagnostics.empty()) {

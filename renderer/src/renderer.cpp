@@ -253,6 +253,12 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
       clock_(output.stage_timing) {
   scene_stats_.warnings.insert(scene_stats_.warnings.end(), geometry.warnings.begin(),
                                geometry.warnings.end());
+  if (!scenario.contacts.empty()) {
+    scene_stats_.warnings.push_back(fmt::format(
+        "{}: [[contact]] is ignored: no body conducts to another here, only in emit solve in three "
+        "dimensions",
+        scenario.file.string()));
+  }
   // Give each entity a history of poses.
   for (const scene::ObjectDesc& object : scenario_.objects) {
     if (object.entity_id == 0) continue;

@@ -437,6 +437,29 @@ TEST_F(ConfigTest, a_model_has_a_rotation_and_an_offset_in_its_body) {
               ::testing::HasSubstr("'model_offset_m' must be an array of 3 numbers"));
 }
 
+TEST_F(ConfigTest, joints_name_two_bodies_by_object_or_material) {
+  const std::string bodies =
+      "[[object]]\nname = \"crate\"\ngltf = \"a.glb\"\n[[contact]]\nbetween = ";
+  const auto loaded = scenario(bodies + "[\"crate\", \"concrete\"]\nresistance_m2_k_w = 0.05\n");
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
+  ASSERT_EQ(loaded->contacts.size(), 1U);
+  EXPECT_EQ(loaded->contacts[0].between[0], "crate");
+  EXPECT_EQ(loaded->contacts[0].between[1], "concrete");
+  EXPECT_EQ(loaded->contacts[0].resistance_m2k_w, 0.05);
+  const auto again = load_scenario(write("p.toml", print_scenario(*loaded)), {}, options_);
+  ASSERT_TRUE(again.has_value()) << again.error().text;
+  ASSERT_EQ(again->contacts.size(), 1U);
+  EXPECT_EQ(again->contacts[0].between, loaded->contacts[0].between);
+  EXPECT_EQ(scenario_error(bodies + "[\"create\", \"concrete\"]\nresistance_m2_k_w = 0.05\n"),
+            "s.toml:6:11: no object and no material is named 'create', did you mean 'crate'?");
+  EXPECT_EQ(scenario_error(bodies + "[\"crate\"]\nresistance_m2_k_w = 0.05\n"),
+            "s.toml:6:11: 'between' must be an array of two names");
+  EXPECT_THAT(scenario_error(bodies + "[\"crate\", \"concrete\"]\nresistance_m2_k_w = 0\n"),
+              ::testing::HasSubstr("'resistance_m2_k_w'"));
+  EXPECT_THAT(scenario_error(bodies + "[\"crate\", \"concrete\"]\n"),
+              ::testing::HasSubstr("'resistance_m2_k_w'"));
+}
+
 TEST_F(ConfigTest, endings_of_scene_files_may_be_upper_case) {
   for (const std::string name : {"TRUCK.GLB", "truck.Gltf"}) {
     const auto loaded = scenario("[[object]]\ngltf = \"" + name + "\"\n");

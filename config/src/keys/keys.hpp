@@ -85,6 +85,7 @@ struct DaemonHead {
 [[nodiscard]] const KeyTable<BandDraft>& band_keys();
 [[nodiscard]] const KeyTable<scene::ChannelDesc>& channel_keys();
 [[nodiscard]] const KeyTable<ObjectDraft>& object_keys();
+[[nodiscard]] const KeyTable<scene::ContactDesc>& contact_keys();
 [[nodiscard]] const KeyTable<InstanceDraft>& instance_keys();
 [[nodiscard]] const KeyTable<KeyframeDraft>& keyframe_keys();
 [[nodiscard]] const KeyTable<scene::Material>& material_keys();

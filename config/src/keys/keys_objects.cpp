@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
 #include "emit/physics/constants.hpp"
 #include "keys.hpp"
 
@@ -140,6 +142,34 @@ const KeyTable<KeyframeDraft>& keyframe_keys() {
                                "A jump: nothing is interpolated from the keyframe before."));
     return table;
   }();
+  return keys;
+}
+
+const KeyTable<scene::ContactDesc>& contact_keys() {
+  using scene::ContactDesc;
+  static const KeyTable<ContactDesc> keys = {
+      required(custom<ContactDesc>(
+          {"between", "array of 2 strings", "", "",
+           "The two bodies, each by the name of its object or of its material.", false},
+          [](ContactDesc& out, const Node& node, Diagnostics& diagnostics) {
+            const bool pair = node.kind == Node::Kind::array && node.items.size() == 2 &&
+                              std::ranges::all_of(node.items, [](const Node& item) {
+                                return item.kind == Node::Kind::text;
+                              });
+            if (!pair) {
+              diagnostics.add(node.at, "'between' must be an array of two names");
+              return;
+            }
+            for (std::size_t i = 0; i < 2; ++i) out.between[i] = node.items[i].text;
+          },
+          [](const ContactDesc& in) -> std::optional<std::string> {
+            return "[" + toml_string(in.between[0]) + ", " + toml_string(in.between[1]) + "]";
+          })),
+      required(number<ContactDesc>("resistance_m2_k_w", "m2 K W-1", above_to(0, 1e6),
+                                   EMIT_FIELD(resistance_m2k_w),
+                                   "Thermal resistance of the joint: 1e-4 stands for metal pressed "
+                                   "on metal, 0.03 for 1 mm of foam, 1e6 for no contact.")),
+  };
   return keys;
 }
 

@@ -111,6 +111,9 @@ std::string print_scenario(const scene::ScenarioDesc& scenario) {
   for (const scene::ObjectDesc& object : scenario.objects) {
     print_object(object, out);
   }
+  for (const scene::ContactDesc& contact : scenario.contacts) {
+    print_section("[[contact]]", contact, contact_keys(), out);
+  }
   for (const scene::Material& material : scenario.materials) {
     print_section("[[material]]", material, material_keys(), out);
   }

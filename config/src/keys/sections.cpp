@@ -45,6 +45,12 @@ const std::vector<SectionDoc>& scenario_sections() {
                   "A keyframe of an object or of the sensor (`[[sensor.trajectory]]`). The first "
                   "pose holds before it, the last one after it.",
                   keyframe_keys(), KeyframeDraft{}),
+      section_doc("contact", true,
+                  "A joint with a thermal resistance between bodies that touch. Bodies that touch "
+                  "without one conduct to each other as if grown together. Only `emit solve` in "
+                  "three dimensions conducts from body to body; all else ignores the section with "
+                  "a warning.",
+                  contact_keys(), scene::ContactDesc{}),
       section_doc(
           "material", true,
           "A material of the scenario or of a library file, which holds nothing but materials.",

@@ -48,6 +48,10 @@ void check_material_name(const std::string& name, const std::vector<scene::Mater
 [[nodiscard]] std::vector<scene::ObjectDesc> resolve_objects(
     const Node& root, const std::vector<scene::Material>& materials, bool require_files,
     Diagnostics& diagnostics);
+/// Reads the joints between bodies. Reports names that no object and no material has.
+[[nodiscard]] std::vector<scene::ContactDesc> resolve_contacts(
+    const Node& root, const std::vector<scene::ObjectDesc>& objects,
+    const std::vector<scene::Material>& materials, Diagnostics& diagnostics);
 [[nodiscard]] scene::SensorDesc resolve_sensor(const Node& root, Diagnostics& diagnostics);
 
 /// Kind of a file by the keys of its first level, see kind_of_file().

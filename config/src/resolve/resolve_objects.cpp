@@ -248,4 +248,29 @@ scene::SensorDesc resolve_sensor(const Node& root, Diagnostics& diagnostics) {
   return desc;
 }
 
+std::vector<scene::ContactDesc> resolve_contacts(const Node& root,
+                                                 const std::vector<scene::ObjectDesc>& objects,
+                                                 const std::vector<scene::Material>& materials,
+                                                 Diagnostics& diagnostics) {
+  std::vector<scene::ContactDesc> contacts;
+  if (!root.has("contact")) return contacts;
+  std::vector<std::string> known;
+  for (const scene::ObjectDesc& object : objects) known.push_back(object.name);
+  for (const scene::Material& material : materials) known.push_back(material.name);
+  for (const Node& node : section_array(root, "contact", diagnostics)) {
+    scene::ContactDesc contact;
+    const std::size_t faults = diagnostics.size();
+    read_table(node, contact_keys(), contact, diagnostics);
+    if (diagnostics.size() != faults) continue;
+    for (const std::string& name : contact.between) {
+      if (std::ranges::find(known, name) != known.end()) continue;
+      diagnostics.add(key_location(node, "between"),
+                      fmt::format("no object and no material is named '{}'{}", name,
+                                  did_you_mean(name, known)));
+    }
+    contacts.push_back(std::move(contact));
+  }
+  return contacts;
+}
+
 }  // namespace emit::config

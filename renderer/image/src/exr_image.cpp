@@ -22,6 +22,7 @@
 #include <set>
 #include <utility>
 
+#include "emit/physics/constants.hpp"
 #include "exr_header.hpp"
 
 namespace emit::image {
@@ -282,6 +283,7 @@ void set_frame_metadata(ExrImage& image, const FrameMetadata& metadata) {
   attributes["bandHiUm"] = metadata.band_hi_um;
   attributes["units"] = metadata.units;
   if (metadata.band_response) attributes["bandResponse"] = response_text(*metadata.band_response);
+  if (metadata.fov_h_rad) attributes["fovHDeg"] = *metadata.fov_h_rad / physics::kDegree;
 }
 
 physics::Result<FrameMetadata> frame_metadata(const ExrImage& image) {
@@ -302,6 +304,11 @@ physics::Result<FrameMetadata> frame_metadata(const ExrImage& image) {
     auto response = response_attribute(image);
     if (!response) return tl::unexpected(response.error());
     metadata.band_response = std::move(*response);
+  }
+  if (image.attributes.contains("fovHDeg")) {
+    const auto fov_h_deg = number_attribute(image, "fovHDeg");
+    if (!fov_h_deg) return tl::unexpected(fov_h_deg.error());
+    metadata.fov_h_rad = *fov_h_deg * physics::kDegree;
   }
   physics::Pose& pose = metadata.sensor_pose;
   const std::pair<const char*, double*> numbers[] = {{"posePositionXM", &pose.position_world_m.x},

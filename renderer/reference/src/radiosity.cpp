@@ -116,9 +116,10 @@ void SceneExchange::trace(std::span<const ExchangeFace> surfaces, const FaceFind
         ++(ray.direction.z > 0.0 ? sky : ground);
         continue;
       }
-      const auto face = ray.hit.front
-                            ? finder.find(ray.hit.position_world_m, ray.hit.geometric_normal)
-                            : std::nullopt;
+      // The back of a sheet is a face too.
+      const glm::dvec3 towards =
+          ray.hit.front ? ray.hit.geometric_normal : -ray.hit.geometric_normal;
+      const auto face = finder.find(ray.hit.position_world_m, towards);
       // Count a surface that is not part of the model as surroundings.
       if (face) {
         hits.push_back(patch_[*face]);

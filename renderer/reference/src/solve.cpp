@@ -85,11 +85,19 @@ struct SceneSolver::Data {
   bool started = false;
   bool resumed = false;
   bool stopped = false;
+  double spin_up_s = 0.0;
+  std::string reason;
   std::vector<std::string> notes;
 
+  void lengthen_history(bool three);
   Result<void> start_solid();
   Result<std::vector<PixelHit>> see(const SolveView& view, SolvedImage& image,
                                     std::vector<glm::dvec3>& sky_rays) const;
+  Result<void> choose_dimension(bool& three);
+  Result<void> check_instant(std::int64_t sim_time_ns) const;
+  Result<std::vector<double>> temperatures(std::vector<PixelHit>& hits, std::int64_t sim_time_ns);
+  std::optional<PixelHit> surface_at(const SceneInstant& instant, const SolveProbe& probe,
+                                     ProbedPoint& out) const;
   void radiate(const SolveView& view, std::span<const PixelHit> hits,
                std::span<const double> kelvin, std::span<const glm::dvec3> sky_rays,
                SolvedImage& image);
@@ -98,9 +106,11 @@ struct SceneSolver::Data {
 Result<SceneSolver> SceneSolver::create(const scene::ScenarioDesc& scenario,
                                         const scene::SceneGeometry& geometry,
                                         const SolveOptions& options, std::int64_t end_ns) {
-  if (options.rays == 0 || !(options.refine > 0.0) || !(options.tolerance_k > 0.0)) {
+  if (options.rays == 0 || !(options.refine > 0.0) || !(options.tolerance_k > 0.0) ||
+      !(options.spin_up_s >= 0.0)) {
     return make_error(ErrorCode::invalid_argument,
-                      "solve: rays, refinement and tolerance must be positive");
+                      "solve: rays, refinement and tolerance must be positive, the spin-up must "
+                      "not be negative");
   }
   if (end_ns < scenario.thermal.history_start_ns) {
     return make_error(ErrorCode::invalid_argument,
@@ -111,13 +121,18 @@ Result<SceneSolver> SceneSolver::create(const scene::ScenarioDesc& scenario,
   data->geometry = geometry;
   data->options = options;
   data->end_ns = end_ns;
+  bool three = false;
+  if (auto chosen = data->choose_dimension(three); !chosen) {
+    return tl::unexpected(std::move(chosen.error()));
+  }
+  data->lengthen_history(three);
   // Prepare rays, climate and bands, which every run needs.
   auto rays = RayScene::create(ray_scene_desc(scenario, geometry));
   if (!rays) return tl::unexpected(std::move(rays.error()));
   data->rays.emplace(std::move(*rays));
   ClimateOptions climate_options;
   climate_options.end_ns = std::max(end_ns, scenario.thermal.history_start_ns + 1);
-  auto climate = SurfaceClimate::create(scenario, climate_options);
+  auto climate = SurfaceClimate::create(data->scenario, climate_options);
   if (!climate) return tl::unexpected(std::move(climate.error()));
   data->climate.emplace(std::move(*climate));
   for (std::size_t band = 0; band < scenario.bands.size(); ++band) {
@@ -125,22 +140,67 @@ Result<SceneSolver> SceneSolver::create(const scene::ScenarioDesc& scenario,
     if (!made) return tl::unexpected(std::move(made.error()));
     data->bands.push_back(std::move(*made));
   }
-  // Decide on the number of dimensions.
-  bool three = options.dimension == SolveDimension::three;
-  if (options.dimension == SolveDimension::automatic) {
-    three = VoxelModel::fits(scenario, geometry);
-  }
   if (three) {
     data->start.emplace(data->rays->at(scenario.thermal.history_start_ns));
     auto solid = SolidHistory::create(data->scenario, data->geometry, *data->start, *data->climate,
                                       data->options, static_cast<double>(end_ns) * 1e-9);
     if (!solid) return tl::unexpected(std::move(solid.error()));
     data->solid = std::move(*solid);
-    data->print = fingerprint(scenario, geometry, options);
-    // Add the end to the fingerprint: the grid is fine along all shadows until the end.
-    data->print.options ^= static_cast<std::uint64_t>(end_ns) * 0x9e3779b97f4a7c15ULL;
+    data->print = fingerprint(data->scenario, geometry, options, end_ns);
   }
   return SceneSolver(std::move(data));
+}
+
+/// Decides on the number of dimensions, and says why. Errors: the keys of the scenario contradict
+/// the number that was asked for.
+Result<void> SceneSolver::Data::choose_dimension(bool& three) {
+  const auto fits = VoxelModel::fits(scenario, geometry);
+  switch (options.dimension) {
+    case SolveDimension::three:
+      reason = "asked for";
+      three = true;
+      break;
+    case SolveDimension::one:
+      reason = "asked for";
+      three = false;
+      break;
+    case SolveDimension::automatic:
+      three = fits.has_value() && scenario.thermal.lateral;
+      reason = three  ? "every face lies across an axis of the world, all bodies are closed or "
+                        "sheets, and nothing moves"
+               : fits ? "thermal.lateral = false asks for no conduction along surfaces"
+                      : fits.error().text;
+      break;
+  }
+  if (three && !scenario.thermal.lateral) {
+    return make_error(ErrorCode::config,
+                      "solve: thermal.lateral = false contradicts a solution in three dimensions, "
+                      "which conducts along surfaces; ask for one dimension");
+  }
+  if (three) return {};
+  // Name the keys that one dimension cannot follow.
+  if (scenario.thermal.exchange) {
+    notes.emplace_back(
+        "in one dimension thermal.exchange has no effect: other surfaces count as surroundings of "
+        "environment temperature");
+  }
+  if (!scenario.contacts.empty()) {
+    notes.emplace_back("in one dimension [[contact]] has no effect: no body conducts to another");
+  }
+  return {};
+}
+
+/// Lets the history begin earlier than the scenario's. Three dimensions take the time before it on
+/// a coarse grid, one dimension in longer steps.
+void SceneSolver::Data::lengthen_history(bool three) {
+  scene::ThermalOptions& thermal = scenario.thermal;
+  if (thermal.spin_up_ns <= 0) return;
+  thermal.spin_up_ns =
+      std::max<std::int64_t>(thermal.spin_up_ns, std::llround(options.spin_up_s * 1e9));
+  spin_up_s = static_cast<double>(thermal.spin_up_ns) / 1e9;
+  if (three) return;
+  thermal.history_start_ns -= thermal.spin_up_ns;
+  thermal.spin_up_ns = 0;
 }
 
 SceneSolver::SceneSolver(std::unique_ptr<Data> data) : data_(std::move(data)) {}
@@ -281,12 +341,12 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
       // The radiance is the patch's emission, and the surroundings mirrored once.
       std::vector<double> leaving(face_k.size());
       threads::parallel_indices(std::size_t{0}, face_k.size(), [&](std::size_t f) {
-        const double e = band.emissivity(geometry.materials[solid->material_of(f)]);
-        const double sky = solid->exchange().sky_frac(f);
+        const double e = band.emissivity(geometry.materials[solid->radiation().material_of(f)]);
+        const double sky = solid->radiation().exchange().sky_frac(f);
         leaving[f] =
             e * band.black(face_k[f]) + (1.0 - e) * (sky * band.sky_mean() + (1.0 - sky) * around);
       });
-      patch = solid->exchange().patch_means(leaving);
+      patch = solid->radiation().exchange().patch_means(leaving);
     }
     std::vector<float>& plane = image.radiance_w_m2_sr[b];
     threads::parallel_indices(std::size_t{0}, hits.size(), [&](std::size_t i) {
@@ -297,7 +357,7 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
                         band.sun_w_m2() / physics::kPi * hit.sun_frac *
                             std::max(0.0, glm::dot(hit.point.normal, to_sun));
       if (solid) {
-        for (const SceneExchange::Link& link : solid->exchange().links(hit.face)) {
+        for (const SceneExchange::Link& link : solid->radiation().links(hit.face)) {
           incoming += static_cast<double>(link.share_frac) * patch[link.patch];
         }
       }
@@ -314,16 +374,54 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
   }
 }
 
+/// Checks that the solution stands at an instant, or can be computed there.
+Result<void> SceneSolver::Data::check_instant(std::int64_t sim_time_ns) const {
+  if (sim_time_ns > end_ns || sim_time_ns < climate->history_start_ns()) {
+    return make_error(ErrorCode::invalid_argument, "solve: the picture lies outside the history");
+  }
+  if (solid &&
+      std::abs(solid->solver().time_s() - static_cast<double>(sim_time_ns) * 1e-9) > 1e-6) {
+    return make_error(ErrorCode::invalid_argument,
+                      "solve: the history does not stand at the picture's instant");
+  }
+  return {};
+}
+
+/// Computes the temperatures of hits. In three dimensions it drops the hits on no face of the model
+/// and completes the others by face and views; in one it solves a history for each.
+Result<std::vector<double>> SceneSolver::Data::temperatures(std::vector<PixelHit>& hits,
+                                                            std::int64_t sim_time_ns) {
+  if (solid) {
+    const SolidRadiation& radiation = solid->radiation();
+    std::vector<PixelHit> on_model;
+    std::vector<double> their_k;
+    for (PixelHit& hit : hits) {
+      const auto face = radiation.finder().find(hit.point.position_world_m, hit.point.normal);
+      if (!face) continue;
+      hit.face = *face;
+      hit.sky_frac = radiation.exchange().sky_frac(*face);
+      hit.ground_frac = radiation.surroundings_frac(*face);
+      on_model.push_back(hit);
+      their_k.push_back(solid->solver().face_k_at(*face, hit.point.position_world_m));
+    }
+    hits.swap(on_model);
+    return their_k;
+  }
+  const PointHistories histories(scenario, geometry, *rays, *climate, options.rays,
+                                 scenario.thermal.history_start_ns + std::llround(spin_up_s * 1e9));
+  std::vector<SolvePoint> points;
+  for (const PixelHit& hit : hits) points.push_back(hit.point);
+  return histories.temperatures(points, sim_time_ns, [&](double share) {
+    stopped = options.progress && !options.progress(share);
+    return !stopped;
+  });
+}
+
 Result<SolvedImage> SceneSolver::image(const SolveView& view) {
   Data& d = *data_;
   SolvedImage image;
-  if (view.sim_time_ns > d.end_ns || view.sim_time_ns < d.climate->history_start_ns()) {
-    return make_error(ErrorCode::invalid_argument, "solve: the picture lies outside the history");
-  }
-  if (d.solid &&
-      std::abs(d.solid->solver().time_s() - static_cast<double>(view.sim_time_ns) * 1e-9) > 1e-6) {
-    return make_error(ErrorCode::invalid_argument,
-                      "solve: the history does not stand at the picture's instant");
+  if (auto good = d.check_instant(view.sim_time_ns); !good) {
+    return tl::unexpected(std::move(good.error()));
   }
   // Find what the pixels show.
   std::vector<glm::dvec3> sky_rays;
@@ -333,37 +431,10 @@ Result<SolvedImage> SceneSolver::image(const SolveView& view) {
   const SceneInstant instant = d.rays->at(view.sim_time_ns);
   const ClimateNode now = d.climate->at(view.sim_time_ns);
   const glm::dvec3 to_sun = glm::normalize(now.to_sun);
-
-  std::vector<double> kelvin(hits.size(), std::numeric_limits<double>::quiet_NaN());
-  if (d.solid) {
-    // Look up the pixels on the faces of the model; drop those on none.
-    std::vector<std::optional<std::uint32_t>> faces(hits.size());
-    for (std::size_t i = 0; i < hits.size(); ++i) {
-      faces[i] = d.solid->finder().find(hits[i].point.position_world_m, hits[i].point.normal);
-    }
-    std::vector<PixelHit> on_model;
-    std::vector<double> their_k;
-    for (std::size_t i = 0; i < hits.size(); ++i) {
-      if (!faces[i]) continue;
-      hits[i].face = *faces[i];
-      hits[i].sky_frac = d.solid->exchange().sky_frac(*faces[i]);
-      hits[i].ground_frac = d.solid->exchange().ground_frac(*faces[i]);
-      on_model.push_back(hits[i]);
-      their_k.push_back(d.solid->solver().face_k_at(*faces[i], hits[i].point.position_world_m));
-    }
-    hits.swap(on_model);
-    kelvin.swap(their_k);
-  } else {
-    // Solve a history in one dimension for every pixel.
-    const PointHistories histories(d.scenario, d.geometry, *d.rays, *d.climate, d.options.rays);
-    std::vector<SolvePoint> points;
-    for (const PixelHit& hit : hits) points.push_back(hit.point);
-    auto solved = histories.temperatures(points, view.sim_time_ns, [&](double share) {
-      d.stopped = d.options.progress && !d.options.progress(share);
-      return !d.stopped;
-    });
-    if (!solved) return tl::unexpected(std::move(solved.error()));
-    kelvin = std::move(*solved);
+  const auto solved = d.temperatures(hits, view.sim_time_ns);
+  if (!solved) return tl::unexpected(solved.error());
+  const std::vector<double>& kelvin = *solved;
+  if (!d.solid) {
     // Trace the view of the sky of every pixel.
     threads::parallel_indices(std::size_t{0}, hits.size(), [&](std::size_t i) {
       hits[i].sky_frac = instant
@@ -392,16 +463,78 @@ Result<SolvedImage> SceneSolver::image(const SolveView& view) {
   return image;
 }
 
+/// Finds the surface that a probe stands for, by rays that come in from around it.
+std::optional<PixelHit> SceneSolver::Data::surface_at(const SceneInstant& instant,
+                                                      const SolveProbe& probe,
+                                                      ProbedPoint& out) const {
+  std::vector<glm::dvec3> from;
+  if (probe.normal) {
+    from.push_back(glm::normalize(*probe.normal));
+  } else {
+    for (const double x : {0.0, -1.0, 1.0}) {
+      for (const double y : {0.0, -1.0, 1.0}) {
+        for (const double z : {1.0, -1.0, 0.0}) {
+          if (x != 0.0 || y != 0.0 || z != 0.0) from.push_back(glm::normalize(glm::dvec3(x, y, z)));
+        }
+      }
+    }
+  }
+  std::optional<PixelHit> best;
+  double nearest_m = kProbeReachM;
+  for (const glm::dvec3& outwards : from) {
+    const auto hit =
+        instant.first_hit({probe.position_m + kProbeReachM * outwards, -outwards, 0.0});
+    if (!hit) continue;
+    if (!probe.object.empty() && scenario.objects[hit->object].name != probe.object) continue;
+    const double away_m = glm::distance(hit->position_world_m, probe.position_m);
+    if (away_m >= nearest_m) continue;
+    nearest_m = away_m;
+    PixelHit p;
+    glm::dvec3 normal = solid ? hit->geometric_normal : hit->shading_normal;
+    if (glm::dot(normal, hit->geometric_normal) <= 0.0) normal = hit->geometric_normal;
+    if (!hit->front) normal = -normal;
+    p.point = {hit->position_world_m, normal, hit->material, hit->entity};
+    out.position_m = hit->position_world_m;
+    out.normal = normal;
+    out.object = hit->object;
+    best = p;
+  }
+  return best;
+}
+
+Result<std::vector<ProbedPoint>> SceneSolver::probe(std::span<const SolveProbe> probes,
+                                                    std::int64_t sim_time_ns) {
+  Data& d = *data_;
+  if (auto good = d.check_instant(sim_time_ns); !good) {
+    return tl::unexpected(std::move(good.error()));
+  }
+  const SceneInstant instant = d.rays->at(sim_time_ns);
+  std::vector<ProbedPoint> points(probes.size());
+  std::vector<PixelHit> hits;
+  for (std::size_t i = 0; i < probes.size(); ++i) {
+    auto hit = d.surface_at(instant, probes[i], points[i]);
+    if (!hit) continue;
+    hit->pixel = static_cast<std::uint32_t>(i);
+    hits.push_back(*hit);
+  }
+  const auto kelvin = d.temperatures(hits, sim_time_ns);
+  if (!kelvin) return tl::unexpected(kelvin.error());
+  for (std::size_t i = 0; i < hits.size(); ++i) points[hits[i].pixel].temperature_k = (*kelvin)[i];
+  return points;
+}
+
 SolveReport SceneSolver::report() const {
   const Data& d = *data_;
   SolveReport report;
   report.notes = d.notes;
+  report.reason = d.reason;
+  report.spin_up_s = d.spin_up_s;
   report.resumed = d.resumed;
   if (d.solid) {
     report.dimension = 3;
     report.nodes = d.solid->solver().free_nodes();
     report.faces = d.solid->solver().faces().size();
-    report.patches = d.solid->exchange().patches();
+    report.patches = d.solid->radiation().exchange().patches();
     report.stats = d.solid->solver().stats();
     report.spin_up = d.solid->spin_up_stats();
   }

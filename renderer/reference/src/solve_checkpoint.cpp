@@ -17,7 +17,7 @@ using physics::make_error;
 using physics::Result;
 
 constexpr std::array<char, 16> kMagic{'e', 'm', 'i', 't', '-',  's', 'o', 'l',
-                                      'v', 'e', ' ', '1', '\n', 0,   0,   0};
+                                      'v', 'e', ' ', '2', '\n', 0,   0,   0};
 
 /// FNV-1a hash over the bytes of values.
 class Hash {
@@ -44,7 +44,7 @@ class Hash {
 /// Adds the properties of a material that determine the result.
 void add_material(Hash& hash, const scene::Material& m) {
   hash.add(m.name).add(m.solar_absorptance_frac).add(m.emissivity_frac).add(m.base_k);
-  hash.add(m.initial_k).add(m.prescribed_k).add(m.layers.size());
+  hash.add(m.initial_k).add(m.prescribed_k).add(m.sheet).add(m.layers.size());
   for (const scene::Layer& l : m.layers) {
     hash.add(l.thickness_m)
         .add(l.conductivity_w_m_k)
@@ -91,7 +91,8 @@ char* bytes_of(T* data) {
 }  // namespace
 
 SolveFingerprint fingerprint(const scene::ScenarioDesc& scenario,
-                             const scene::SceneGeometry& geometry, const SolveOptions& options) {
+                             const scene::SceneGeometry& geometry, const SolveOptions& options,
+                             std::int64_t end_ns) {
   // Hash place and date.
   SolveFingerprint print;
   print.place_and_date = Hash()
@@ -128,19 +129,32 @@ SolveFingerprint fingerprint(const scene::ScenarioDesc& scenario,
   for (const scene::Mesh& mesh : geometry.meshes) {
     shape.add(mesh.positions_m.data(), mesh.positions_m.size() * sizeof(glm::vec3));
     shape.add(mesh.indices.data(), mesh.indices.size() * sizeof(std::uint32_t));
-    for (const scene::Submesh& s : mesh.submeshes) shape.add(s.first_index).add(s.material);
+    for (const scene::Submesh& s : mesh.submeshes) {
+      shape.add(s.first_index).add(s.index_count).add(s.material).add(s.double_sided);
+    }
   }
   for (const scene::Instance& instance : geometry.instances) {
     shape.add(instance.mesh).add(&instance.world_from_mesh, sizeof(glm::dmat4));
+    shape.add(instance.object < scenario.objects.size() ? scenario.objects[instance.object].name
+                                                        : std::string());
   }
   print.geometry = shape.value();
-  // Hash the start of the history and the options.
+  // Hash the joints between the bodies.
+  Hash joints;
+  for (const scene::ContactDesc& contact : scenario.contacts) {
+    joints.add(contact.between[0]).add(contact.between[1]).add(contact.resistance_m2k_w);
+  }
+  print.contacts = joints.value();
+  // Hash the start of the history, its keys and the options. The end counts too: the grid is fine
+  // along all shadows until then.
   print.thermal = Hash()
                       .add(scenario.thermal.initial_k)
                       .add(scenario.thermal.history_start_ns)
                       .add(scenario.thermal.spin_up_ns)
+                      .add(scenario.thermal.exchange)
                       .value();
-  print.options = Hash().add(options.rays).add(options.refine).add(options.tolerance_k).value();
+  print.options =
+      Hash().add(options.rays).add(options.refine).add(options.tolerance_k).add(end_ns).value();
   return print;
 }
 
@@ -199,13 +213,14 @@ Result<std::optional<Checkpoint>> load_checkpoint(const std::filesystem::path& f
     return make_error(ErrorCode::parse,
                       fmt::format("{}: not a checkpoint of emit solve", file.string()));
   }
-  const std::array<std::pair<bool, const char*>, 6> parts{{
+  const std::array<std::pair<bool, const char*>, 7> parts{{
       {header.print.place_and_date == print.place_and_date, "place or date"},
       {header.print.weather == print.weather, "weather"},
       {header.print.materials == print.materials, "materials"},
       {header.print.geometry == print.geometry, "geometry"},
-      {header.print.thermal == print.thermal, "start of the history"},
-      {header.print.options == print.options, "rays, refinement or tolerance"},
+      {header.print.contacts == print.contacts, "contacts"},
+      {header.print.thermal == print.thermal, "start of the history, spin-up or thermal.exchange"},
+      {header.print.options == print.options, "rays, refinement, tolerance or the last instant"},
   }};
   std::string differs;
   for (const auto& [same, name] : parts) {

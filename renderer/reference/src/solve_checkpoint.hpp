@@ -20,13 +20,14 @@ struct SolveFingerprint {
   std::uint64_t weather = 0;
   std::uint64_t materials = 0;
   std::uint64_t geometry = 0;
+  std::uint64_t contacts = 0;
   std::uint64_t thermal = 0;
   std::uint64_t options = 0;
 };
-/// Computes the fingerprint of a run.
+/// Computes the fingerprint of a run whose last instant is `end_ns`.
 [[nodiscard]] SolveFingerprint fingerprint(const scene::ScenarioDesc& scenario,
                                            const scene::SceneGeometry& geometry,
-                                           const SolveOptions& options);
+                                           const SolveOptions& options, std::int64_t end_ns);
 
 /// Returns the path of the checkpoint of a scenario.
 [[nodiscard]] std::filesystem::path checkpoint_file(const scene::ScenarioDesc& scenario,

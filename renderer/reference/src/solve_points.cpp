@@ -22,6 +22,10 @@ constexpr std::int64_t kSecondNs = 1'000'000'000;
 /// Times between samples of the visibility, which is linear between them. If the sun's share
 /// changes, the interval is halved down to the shortest one.
 constexpr std::int64_t kStaticStepNs = 60 * kSecondNs;
+/// The same in the time before the scenario's own history, in which nothing moves and whose edges
+/// have faded.
+constexpr std::int64_t kSpinUpStepNs = 600 * kSecondNs;
+constexpr std::int64_t kShortestSpinUpNs = 75 * kSecondNs;
 constexpr std::int64_t kMovingStepNs = 4 * kSecondNs;
 constexpr std::int64_t kShortestStaticNs = 4 * kSecondNs;
 constexpr std::int64_t kShortestMovingNs = kSecondNs / 2;
@@ -53,9 +57,11 @@ class PointViews {
     for (std::size_t i = 0; i < nodes_ns.size(); ++i) {
       const auto [sample, sun] = look(nodes_ns[i], instants[i]);
       if (i > 0) {
-        const bool moving = nodes_ns[i] - nodes_ns[i - 1] < kStaticStepNs;
+        const std::int64_t step = nodes_ns[i] - nodes_ns[i - 1];
         refine(nodes_ns[i - 1], last_sun, nodes_ns[i], sun,
-               moving ? kShortestMovingNs : kShortestStaticNs);
+               step < kStaticStepNs   ? kShortestMovingNs
+               : step > kStaticStepNs ? kShortestSpinUpNs
+                                      : kShortestStaticNs);
       }
       out_.push_back(sample);
       last_sun = sun;
@@ -162,8 +168,14 @@ class PointViews {
 
 PointHistories::PointHistories(const scene::ScenarioDesc& scenario,
                                const scene::SceneGeometry& geometry, const RayScene& scene,
-                               const SurfaceClimate& climate, std::uint32_t rays)
-    : scenario_(scenario), geometry_(geometry), scene_(scene), climate_(climate), rays_(rays) {}
+                               const SurfaceClimate& climate, std::uint32_t rays,
+                               std::int64_t dense_from_ns)
+    : scenario_(scenario),
+      geometry_(geometry),
+      scene_(scene),
+      climate_(climate),
+      rays_(rays),
+      dense_from_ns_(dense_from_ns) {}
 
 /// Returns true if an entity moves or switches between two instants.
 bool PointHistories::moves(const SceneInstant& a, const SceneInstant& b) const {
@@ -185,6 +197,12 @@ void PointHistories::choose_nodes(std::int64_t until_ns,
                                   std::vector<std::int64_t>& nodes_ns) const {
   std::int64_t t = climate_.history_start_ns();
   nodes_ns = {t};
+  while (t < std::min(until_ns, dense_from_ns_)) {
+    // The last step may be longer than the others, so that none looks like one of the other kinds.
+    const std::int64_t left = std::min(until_ns, dense_from_ns_) - t;
+    t += left < 2 * kSpinUpStepNs ? left : kSpinUpStepNs;
+    nodes_ns.push_back(t);
+  }
   while (t < until_ns) {
     const std::int64_t next = std::min(until_ns, t + kStaticStepNs);
     // Look in the middle as well: a keyframe between the ends moves too.

@@ -24,8 +24,11 @@ struct SolvePoint {
 /// points were in the past. Owner: the caller.
 class PointHistories {
  public:
+  /// Prepares histories from the start of the climate's history. Visibility is sampled densely from
+  /// `dense_from_ns` on. The arguments must outlive the object.
   PointHistories(const scene::ScenarioDesc& scenario, const scene::SceneGeometry& geometry,
-                 const RayScene& scene, const SurfaceClimate& climate, std::uint32_t rays);
+                 const RayScene& scene, const SurfaceClimate& climate, std::uint32_t rays,
+                 std::int64_t dense_from_ns);
 
   /// Returns the temperature of every point at `sim_time_ns`. The work is spread over the cores.
   /// The calling thread calls `done` between portions with the share done; a return of false stops
@@ -48,6 +51,7 @@ class PointHistories {
   const RayScene& scene_;
   const SurfaceClimate& climate_;
   std::uint32_t rays_;
+  std::int64_t dense_from_ns_;
 };
 
 }  // namespace emit::reference

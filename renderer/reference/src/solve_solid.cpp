@@ -106,6 +106,75 @@ ExchangeSky exchange_sky(const ClimateNode& now, double surroundings_reflectance
           surroundings_reflectance_frac * global, physics::kStefanBoltzmannWPerM2K4 * t2 * t2};
 }
 
+SolidRadiation::SolidRadiation(const VoxelModel& model, const SolidSolver& solver,
+                               const scene::SceneGeometry& geometry, const SceneInstant& instant,
+                               const SurfaceClimate& climate, const SolveOptions& options,
+                               bool exchanges)
+    : model_(model),
+      instant_(instant),
+      climate_(climate),
+      exchanges_(exchanges),
+      finder_(model.grid(), solver.faces(), model.thickest_sheet_m()) {
+  const auto faces = solver.faces();
+  for (const SolidFace& face : faces) {
+    surfaces_.push_back(surface_of(model, face, geometry));
+    face_material_.push_back(model.face(face).material);
+  }
+  exchange_ = std::make_unique<SceneExchange>(faces, surfaces_, finder_, instant, options.rays);
+  sun_ = std::make_unique<SunOnFaces>(faces, surfaces_);
+  sun_frac_.resize(faces.size());
+  direct_w_m2_.resize(faces.size());
+  incoming_.resize(faces.size());
+}
+
+void SolidRadiation::drive(double time_s, std::span<const double> face_k, const FaceDrive& out) {
+  const ClimateNode now = climate_.at(ns(time_s));
+  const glm::dvec3 to_sun = glm::normalize(now.to_sun);
+  const std::size_t n = surfaces_.size();
+  // Compute the sun on every face.
+  if (now.direct_normal_w_m2 > 0.0) {
+    sun_->visible_frac(instant_, to_sun, sun_frac_);
+  } else {
+    std::fill(sun_frac_.begin(), sun_frac_.end(), 0.0);
+  }
+  for (std::size_t f = 0; f < n; ++f) {
+    direct_w_m2_[f] = now.direct_normal_w_m2 * sun_frac_[f] *
+                      std::max(0.0, glm::dot(surfaces_[f].normal, to_sun));
+  }
+  // Compute the radiation between the faces, or take all of them for surroundings.
+  const ExchangeSky sky = exchange_sky(now, climate_.surroundings_reflectance_frac());
+  if (exchanges_) {
+    left_w_m2_ = std::max(left_w_m2_, exchange_->incoming(direct_w_m2_, face_k, sky, incoming_));
+  } else {
+    for (std::size_t f = 0; f < n; ++f) {
+      const double open = exchange_->sky_frac(f);
+      const double around = surroundings_frac(f);
+      incoming_[f] = {open * sky.diffuse_w_m2 + around * sky.ground_short_w_m2,
+                      open * sky.longwave_w_m2 + around * sky.ground_long_w_m2};
+    }
+  }
+  // Set the drive of every face.
+  const double cavity4 = std::pow(model_.cavity_k(), 4);
+  for (std::size_t f = 0; f < n; ++f) {
+    const ExchangeFace& s = surfaces_[f];
+    out.film_w_m2_k[f] = s.enclosed ? 0.0 : now.film_w_m2_k;
+    out.air_k[f] = now.air_k;
+    out.absorbed_w_m2[f] =
+        s.enclosed ? s.emissivity_frac * physics::kStefanBoltzmannWPerM2K4 * cavity4
+                   : s.solar_absorptance_frac * (direct_w_m2_[f] + incoming_[f].shortwave_w_m2) +
+                         s.emissivity_frac * incoming_[f].longwave_w_m2;
+  }
+}
+
+Result<void> SolidRadiation::check() const {
+  if (left_w_m2_ <= kRadiosityToleranceWM2) return {};
+  return physics::make_error(
+      physics::ErrorCode::invalid_argument,
+      fmt::format("reflections between faces do not fade: {:.3g} W/m2 are left. Some material "
+                  "absorbs nothing and encloses others",
+                  left_w_m2_));
+}
+
 Result<std::unique_ptr<SolidHistory>> SolidHistory::create(const scene::ScenarioDesc& scenario,
                                                            const scene::SceneGeometry& geometry,
                                                            const SceneInstant& instant,
@@ -139,19 +208,8 @@ Result<std::unique_ptr<SolidHistory>> SolidHistory::create(const scene::Scenario
       history->solid_options());
   if (!solver) return tl::unexpected(std::move(solver.error()));
   history->solver_ = std::make_unique<SolidSolver>(std::move(*solver));
-  // Prepare the radiation of its faces.
-  const auto faces = history->solver_->faces();
-  for (const SolidFace& face : faces) {
-    history->surfaces_.push_back(surface_of(voxel, face, geometry));
-    history->face_material_.push_back(voxel.face(face).material);
-  }
-  history->finder_ = std::make_unique<FaceFinder>(voxel.grid(), faces);
-  history->exchange_ = std::make_unique<SceneExchange>(faces, history->surfaces_, *history->finder_,
-                                                       instant, options.rays);
-  history->sun_ = std::make_unique<SunOnFaces>(faces, history->surfaces_);
-  history->sun_frac_.resize(faces.size());
-  history->direct_w_m2_.resize(faces.size());
-  history->incoming_.resize(faces.size());
+  history->radiation_ = std::make_unique<SolidRadiation>(
+      voxel, *history->solver_, geometry, instant, climate, options, scenario.thermal.exchange);
   return history;
 }
 
@@ -172,7 +230,7 @@ Result<void> SolidHistory::spin_up() {
     solver_->set_temperature(history_s, steady);
     return {};
   }
-  // Build a coarser grid: nothing is shadowed yet, so no shadow's edge needs small cells.
+  // Build a coarser grid: an edge of a shadow that old has faded.
   VoxelOptions voxels;
   voxels.refine = options_.refine;
   auto coarse = VoxelModel::build(scenario_, geometry_, voxels);
@@ -182,36 +240,18 @@ Result<void> SolidHistory::spin_up() {
   auto solver = SolidSolver::create(
       coarse->grid(), [&](const SolidFace& face) { return coarse->condition(face); }, solid);
   if (!solver) return tl::unexpected(std::move(solver.error()));
-  std::vector<ExchangeFace> surfaces;
-  for (const SolidFace& face : solver->faces()) {
-    surfaces.push_back(surface_of(*coarse, face, geometry_));
-  }
-  // Drive every face as an open one, or by its cavity.
-  const double cavity4 = std::pow(coarse->cavity_k(), 4);
-  const DriveFunction drive_open = [&](double time_s, std::span<const double>,
-                                       const FaceDrive& out) {
-    const ClimateNode now = climate_.at(ns(time_s));
-    for (std::size_t f = 0; f < surfaces.size(); ++f) {
-      const ExchangeFace& s = surfaces[f];
-      if (s.enclosed) {
-        out.absorbed_w_m2[f] = s.emissivity_frac * physics::kStefanBoltzmannWPerM2K4 * cavity4;
-        out.film_w_m2_k[f] = 0.0;
-        out.air_k[f] = 0.0;
-        continue;
-      }
-      const FaceState face =
-          face_state(now, {s.normal, s.solar_absorptance_frac, s.emissivity_frac},
-                     open_view(s.normal), climate_.surroundings_reflectance_frac());
-      out.absorbed_w_m2[f] = face.absorbed_w_m2;
-      out.film_w_m2_k[f] = face.film_w_m2_k;
-      out.air_k[f] = face.air_k;
-    }
-  };
+  SolidRadiation radiation(*coarse, *solver, geometry_, instant_, climate_, options_,
+                           scenario_.thermal.exchange);
   // Advance from the steady profile to the start of the history.
   solver->set_temperature(start_s, steady);
   const auto reached = solver->advance(
-      history_s, drive_open, [&](double) { return !options_.progress || options_.progress(0.0); });
+      history_s,
+      [&](double time_s, std::span<const double> face_k, const FaceDrive& out) {
+        radiation.drive(time_s, face_k, out);
+      },
+      [&](double) { return !options_.progress || options_.progress(0.0); });
   if (!reached) return tl::unexpected(reached.error());
+  if (auto faded = radiation.check(); !faded) return faded;
   // Take over the temperatures.
   const NodeField field(coarse->grid(), *solver);
   solver_->set_temperature(history_s, [&](const glm::dvec3& p) { return field.at(p); });
@@ -219,52 +259,14 @@ Result<void> SolidHistory::spin_up() {
   return {};
 }
 
-void SolidHistory::drive(double time_s, std::span<const double> face_k, const FaceDrive& out) {
-  const ClimateNode now = climate_.at(ns(time_s));
-  const glm::dvec3 to_sun = glm::normalize(now.to_sun);
-  const std::size_t n = surfaces_.size();
-  // Compute the sun on every face.
-  if (now.direct_normal_w_m2 > 0.0) {
-    sun_->visible_frac(instant_, to_sun, sun_frac_);
-  } else {
-    std::fill(sun_frac_.begin(), sun_frac_.end(), 0.0);
-  }
-  for (std::size_t f = 0; f < n; ++f) {
-    direct_w_m2_[f] = now.direct_normal_w_m2 * sun_frac_[f] *
-                      std::max(0.0, glm::dot(surfaces_[f].normal, to_sun));
-  }
-  // Compute the radiation between the faces.
-  const double left_w_m2 = exchange_->incoming(
-      direct_w_m2_, face_k, exchange_sky(now, climate_.surroundings_reflectance_frac()), incoming_);
-  exchange_left_w_m2_ = std::max(exchange_left_w_m2_, left_w_m2);
-  // Set the drive of every face.
-  const double cavity4 = std::pow(model_->cavity_k(), 4);
-  for (std::size_t f = 0; f < n; ++f) {
-    const ExchangeFace& s = surfaces_[f];
-    out.film_w_m2_k[f] = s.enclosed ? 0.0 : now.film_w_m2_k;
-    out.air_k[f] = now.air_k;
-    out.absorbed_w_m2[f] =
-        s.enclosed ? s.emissivity_frac * physics::kStefanBoltzmannWPerM2K4 * cavity4
-                   : s.solar_absorptance_frac * (direct_w_m2_[f] + incoming_[f].shortwave_w_m2) +
-                         s.emissivity_frac * incoming_[f].longwave_w_m2;
-  }
-}
-
 Result<void> SolidHistory::advance(double to_s, const std::function<bool(double)>& after_step) {
   auto advanced = solver_->advance(
       to_s,
       [this](double time_s, std::span<const double> face_k, const FaceDrive& out) {
-        drive(time_s, face_k, out);
+        radiation_->drive(time_s, face_k, out);
       },
       after_step);
-  if (advanced && exchange_left_w_m2_ > kRadiosityToleranceWM2) {
-    return physics::make_error(
-        physics::ErrorCode::invalid_argument,
-        fmt::format("reflections between faces do not fade: {:.3g} W/m2 are left. Some material "
-                    "absorbs nothing and encloses others",
-                    exchange_left_w_m2_));
-  }
-  return advanced;
+  return advanced ? radiation_->check() : std::move(advanced);
 }
 
 Result<void> SolidHistory::restore(const SolidState& state, const SolidStats& spin_up) {

@@ -280,7 +280,8 @@ Result<void> Demo::save_frame() {
                      tcp_client_->channel().band_lo_um,
                      tcp_client_->channel().band_hi_um,
                      "W m-2 sr-1",
-                     tcp_client_->channel().response};
+                     tcp_client_->channel().response,
+                     snapshot.header.fov_h_rad};
   if (auto written = write_frame_files(command_.out, planes,
                                        {scenario_.display.min_k, scenario_.display.max_k});
       !written) {

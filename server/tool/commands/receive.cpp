@@ -90,7 +90,8 @@ physics::Result<void> save(const std::filesystem::path& directory,
                      drive         ? "drive"
                      : temperature ? "K"
                                    : "W m-2 sr-1",
-                     channel.response};
+                     channel.response,
+                     frame.header.fov_h_rad};
   return write_frame_files(directory, planes, style);
 }
 

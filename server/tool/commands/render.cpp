@@ -259,8 +259,9 @@ physics::Result<void> Rendering::write_files(double time_s, std::size_t band,
   planes.temperature_k = view.temperature_k;
   planes.depth_m = view.depth_m;
   planes.object_id = view.object_id;
-  planes.metadata = {view.sim_time_ns, view.frame_number, view.sensor_pose, shown.name,
-                     shown.lo_um,      shown.hi_um,       "W m-2 sr-1",     response_of(shown)};
+  planes.metadata = {view.sim_time_ns, view.frame_number,  view.sensor_pose,
+                     shown.name,       shown.lo_um,        shown.hi_um,
+                     "W m-2 sr-1",     response_of(shown), view.fov_h_rad};
   if (plan_.png_names) {
     const PngStyle style{scenario_.display.min_k, scenario_.display.max_k,
                          png_quantity(command_.png_of)};
@@ -296,6 +297,10 @@ void Rendering::print_warnings(const renderer::FrameView& view) const {
       plan_.times_s.size() > 1
           ? fmt::format("sim time {:.3f} s: ", 1e-9 * static_cast<double>(view.sim_time_ns))
           : std::string();
+  if (!view.depth_m.empty() &&
+      std::ranges::all_of(view.depth_m, [](float depth) { return std::isinf(depth); })) {
+    warn(fmt::format("{}the view shows nothing but sky", frame));
+  }
   if (view.stats.nonfinite_px > 0) {
     warn(fmt::format("{}{} pixels were not finite and are written as 0", frame,
                      view.stats.nonfinite_px));

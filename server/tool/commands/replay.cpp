@@ -80,7 +80,7 @@ class FrameFolder {
     planes.apparent = apparent_ ? &*apparent_ : nullptr;
     planes.metadata = {frame.sim_time_ns, frame.frame_number, frame.view->sensor_pose,
                        band_.name,        band_.lo_um,        band_.hi_um,
-                       "W m-2 sr-1",      response_of(band_)};
+                       "W m-2 sr-1",      response_of(band_), frame.view->fov_h_rad};
     return write_frame_files(folder_, planes, style_);
   }
 

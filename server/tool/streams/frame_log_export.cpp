@@ -92,7 +92,8 @@ Result<void> write_image(const std::filesystem::path& folder, const v1::Recorded
     response.push_back({channel.response_um(i), channel.response_frac(i)});
   }
   planes.metadata = {frame.sim_time_ns(),  frame.frame_number(), header->pose, channel.band(),
-                     channel.band_lo_um(), channel.band_hi_um(), frame.unit(), response};
+                     channel.band_lo_um(), channel.band_hi_um(), frame.unit(), response,
+                     header->fov_h_rad};
   return write_frame_exr(folder / fmt::format("frame_{:06}.exr", frame.frame_number()), planes);
 }
 

@@ -80,6 +80,7 @@ TEST(ExrImage, frame_metadata_survives_exactly) {
   metadata.band_name = "8-12";
   metadata.band_lo_um = 8.0;
   metadata.band_hi_um = 12.0;
+  metadata.fov_h_rad = 0.625;
   set_frame_metadata(image, metadata);
   const auto file = scratch("metadata.exr");
   ASSERT_TRUE(write_exr(file, image));
@@ -93,6 +94,8 @@ TEST(ExrImage, frame_metadata_survives_exactly) {
   EXPECT_EQ(read->sensor_pose.world_from_body, metadata.sensor_pose.world_from_body);
   EXPECT_EQ(read->band_name, "8-12");
   EXPECT_EQ(read->band_hi_um, 12.0);
+  ASSERT_TRUE(read->fov_h_rad.has_value());
+  EXPECT_NEAR(*read->fov_h_rad, 0.625, 1e-15);
   EXPECT_EQ(read->units, "W m-2 sr-1");
 }
 

@@ -11,46 +11,11 @@
 #include "emit/physics/constants.hpp"
 #include "emit/reference/solve.hpp"
 #include "emit/reference/voxel_model.hpp"
+#include "solid_scenes.hpp"
 #include "support/sanitizer.hpp"
 
 namespace emit::reference {
 namespace {
-
-/// Adds a rectangle a, b, c, d, counter-clockwise seen from outside.
-void add_quad(scene::Mesh& mesh, const std::array<glm::dvec3, 4>& corners) {
-  const auto first = static_cast<std::uint32_t>(mesh.positions_m.size());
-  const glm::dvec3 normal =
-      glm::normalize(glm::cross(corners[1] - corners[0], corners[2] - corners[0]));
-  for (const glm::dvec3& p : corners) {
-    mesh.positions_m.emplace_back(p);
-    mesh.normals.emplace_back(normal);
-  }
-  for (const std::uint32_t i : {0U, 1U, 2U, 0U, 2U, 3U}) mesh.indices.push_back(first + i);
-}
-
-void add_box(scene::Mesh& mesh, const glm::dvec3& a, const glm::dvec3& b) {
-  add_quad(mesh, {{{a.x, a.y, a.z}, {a.x, b.y, a.z}, {b.x, b.y, a.z}, {b.x, a.y, a.z}}});
-  add_quad(mesh, {{{a.x, a.y, b.z}, {b.x, a.y, b.z}, {b.x, b.y, b.z}, {a.x, b.y, b.z}}});
-  add_quad(mesh, {{{a.x, a.y, a.z}, {b.x, a.y, a.z}, {b.x, a.y, b.z}, {a.x, a.y, b.z}}});
-  add_quad(mesh, {{{b.x, b.y, a.z}, {a.x, b.y, a.z}, {a.x, b.y, b.z}, {b.x, b.y, b.z}}});
-  add_quad(mesh, {{{a.x, b.y, a.z}, {a.x, a.y, a.z}, {a.x, a.y, b.z}, {a.x, b.y, b.z}}});
-  add_quad(mesh, {{{b.x, a.y, a.z}, {b.x, b.y, a.z}, {b.x, b.y, b.z}, {b.x, a.y, b.z}}});
-}
-
-struct TestScene {
-  scene::ScenarioDesc scenario;
-  scene::SceneGeometry geometry;
-};
-
-void finish_mesh(TestScene& t, scene::Mesh mesh, std::uint32_t material) {
-  mesh.submeshes = {{0, static_cast<std::uint32_t>(mesh.indices.size()), material, false}};
-  for (const glm::vec3& p : mesh.positions_m) mesh.bounds.add(glm::dvec3(p));
-  scene::Instance instance;
-  instance.mesh = static_cast<std::uint32_t>(t.geometry.meshes.size());
-  instance.world_bounds = mesh.bounds;
-  t.geometry.meshes.push_back(std::move(mesh));
-  t.geometry.instances.push_back(instance);
-}
 
 /// Returns a solid cube of 0.4 m on 6 m of asphalt, on a summer's forenoon.
 TestScene block_scene() {
@@ -170,11 +135,11 @@ TEST(ReferenceSolve, ShapesThatAreNotSolidsAreRefusedByName) {
   const auto open = VoxelModel::build(t.scenario, t.geometry, {});
   ASSERT_FALSE(open.has_value());
   EXPECT_NE(open.error().text.find("object 'scene'"), std::string::npos);
-  EXPECT_FALSE(VoxelModel::fits(t.scenario, t.geometry));
+  EXPECT_FALSE(VoxelModel::fits(t.scenario, t.geometry).has_value());
   t = block_scene();
   t.geometry.instances[1].world_from_mesh =
       glm::rotate(glm::dmat4(1.0), 0.3, glm::dvec3(0.0, 0.0, 1.0));
-  EXPECT_FALSE(VoxelModel::fits(t.scenario, t.geometry));
+  EXPECT_FALSE(VoxelModel::fits(t.scenario, t.geometry).has_value());
 }
 
 TEST(ReferenceSolve, FarFromTheBlockThreeDimensionsAgreeWithOne) {

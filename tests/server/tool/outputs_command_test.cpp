@@ -47,6 +47,7 @@ const std::vector<OutputCase>& output_cases() {
     add({"render", "box", "--time-s", "12600", "--out", "GOOD"}, {"--out", "--png", "--json"});
     add({"solve", "box", "--time-s", "3600", "--out", "GOOD"}, {"--out", "--png", "--json"},
         {"--checkpoint"});
+    add({"solve", "box", "--time-s", "3600", "--at", "no.csv"}, {"--at-out"});
     add({"demo", "--out", "GOOD"}, {"--json"}, {"--out"});
     add({"engage", "--out", "GOOD"}, {"--json"}, {"--out"});
     add({"receive", "tcp://127.0.0.1:1"}, {"--json"}, {"--out"});

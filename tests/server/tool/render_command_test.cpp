@@ -212,6 +212,80 @@ TEST(CliSolve, a_few_pixels_by_layers_alone) {
   EXPECT_NE(result.out.find("40 of"), std::string::npos) << result.out;
 }
 
+/// Command of a quick solution in one dimension with two instants.
+std::vector<std::string> quick_solve(std::vector<std::string> more) {
+  std::vector<std::string> arguments{"solve",       "box",
+                                     "--time-s",    "7200",
+                                     "--time-s",    "3600",
+                                     "--pixels",    "10",
+                                     "--rays",      "16",
+                                     "--set",       "sensor.width_px=32",
+                                     "--set",       "sensor.height_px=24",
+                                     "--set",       "thermal.model=foster",
+                                     "--dimension", "1"};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+
+TEST(CliSolve, points_of_a_table_have_temperatures_at_every_instant) {
+  const TemporaryFolder folder;
+  write_text(folder.file("at.csv"),
+             "# One point of the ground and one of the air\nx_m,y_m,z_m,nx,ny,nz\n"
+             "15,15,0.001,0,0,1\n0,0,500,,,\n");
+  const ProcessResult result =
+      run_emit(quick_solve({"--at", folder.file("at.csv"), "--json", folder.file("a.json")}));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.err.find("1 of 2 points"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("thermal.exchange"), std::string::npos) << result.err;
+  std::istringstream lines(result.out);
+  std::string line;
+  std::getline(lines, line);
+  EXPECT_EQ(line, "time_s,x_m,y_m,z_m,nx,ny,nz,object,temperature_k");
+  std::getline(lines, line);
+  EXPECT_EQ(line.rfind("3600,15,15,0,0,0,1,", 0), 0U) << line;
+  std::getline(lines, line);
+  EXPECT_EQ(line, "3600,0,0,500,,,,,nan");
+  std::getline(lines, line);
+  EXPECT_EQ(line.rfind("7200,15,15,0,0,0,1,", 0), 0U) << line;
+  EXPECT_NE(json_value(read_text(folder.file("a.json")), "reason").find("asked for"),
+            std::string::npos);
+  for (const char* table : {"x_m,y_m\n1,2\n", "x_m,y_m,z_m\n1,2,up\n", "x_m,y_m,z_m\n",
+                            "x_m,y_m,z_m,object\n1,2,3,nobody\n"}) {
+    write_text(folder.file("bad.csv"), table);
+    const ProcessResult bad = run_emit(quick_solve({"--at", folder.file("bad.csv")}));
+    EXPECT_EQ(bad.exit_code, 2) << table << bad.err;
+    EXPECT_NE(bad.err.find("bad.csv"), std::string::npos) << bad.err;
+  }
+}
+
+TEST(CliSolve, one_run_gives_the_pictures_of_all_cameras_instants_and_bands) {
+  const TemporaryFolder folder;
+  const ProcessResult result =
+      run_emit(quick_solve({"--out", folder.file("a.exr"), "--camera", "up=0,0,50,0,0,100",
+                            "--camera", "down=0,0,50,0,1,0,40", "--band", "8-12", "--band", "3-5",
+                            "--json", folder.file("a.json")}));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.err.find("camera up: the view shows nothing but sky"), std::string::npos)
+      << result.err;
+  std::size_t pictures = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder.file("."))) {
+    pictures += entry.path().extension() == ".exr" ? 1U : 0U;
+  }
+  EXPECT_EQ(pictures, 8U) << result.out;
+  const ProcessResult bad =
+      run_emit(quick_solve({"--out", folder.file("a.exr"), "--camera", "up=0,0,50"}));
+  EXPECT_EQ(bad.exit_code, 2);
+  EXPECT_NE(bad.err.find("six or seven numbers"), std::string::npos) << bad.err;
+}
+
+TEST(CliRender, a_view_of_nothing_warns) {
+  const TemporaryFolder folder;
+  const ProcessResult result =
+      run_emit(render(folder.file("a.exr"), {"--set", "sensor.trajectory[0].look_at_m=[0,0,1e6]"}));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.err.find("nothing but sky"), std::string::npos) << result.err;
+}
+
 TEST(CliRender, an_unknown_band_exits_with_2_and_lists_the_bands) {
   const TemporaryFolder folder;
   const ProcessResult result = run_emit(render(folder.file("a.exr"), {"--band", "ultraviolet"}));

@@ -51,7 +51,7 @@ struct ExrImage {
 
 /// Metadata that a frame carries in its file. The attributes are simTimeNs and frameNumber (decimal
 /// strings, exact), posePositionX/Y/ZM and poseQuatW/X/Y/Z (world_from_body), bandName, bandLoUm,
-/// bandHiUm, units, and bandResponse ("rectangle", or "um:frac" pairs separated by blanks).
+/// bandHiUm, units, bandResponse ("rectangle", or "um:frac" pairs separated by blanks) and fovHDeg.
 struct FrameMetadata {
   std::int64_t sim_time_ns = 0;
   std::uint64_t frame_number = 0;
@@ -63,6 +63,8 @@ struct FrameMetadata {
   /// Spectral response between the limits. An empty table is a perfect rectangle; no value means
   /// that the file does not say.
   std::optional<std::vector<physics::ResponsePoint>> band_response = std::nullopt;
+  /// Horizontal field of view of the whole sensor, rad; no value where it is not known.
+  std::optional<double> fov_h_rad = std::nullopt;
 };
 /// Stores the metadata as attributes of the image.
 void set_frame_metadata(ExrImage& image, const FrameMetadata& metadata);

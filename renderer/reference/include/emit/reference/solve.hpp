@@ -3,7 +3,9 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -35,6 +37,9 @@ struct SolveOptions {
   double refine = 1.0;
   /// Error of one step at refine 1, K; it falls with the square of refine.
   double tolerance_k = 0.02;
+  /// Least length of the shaded history before the scenario's own, s. Scenarios without a spin-up
+  /// begin at their initial temperatures and get none.
+  double spin_up_s = 72.0 * 3600.0;
   /// Number of pixels of the surface that are solved, always the same ones; 0 solves all.
   std::uint64_t pixels = 0;
   /// Folder of the checkpoint; empty if there is none. Only three dimensions have one.
@@ -70,14 +75,34 @@ struct SolvedImage {
 /// Size and cost of a run.
 struct SolveReport {
   int dimension = 1;
+  std::string reason;         ///< sentence that says why the solution has this dimension
   std::uint64_t nodes = 0;    ///< unknowns of the three-dimensional grid
   std::uint64_t faces = 0;    ///< number of exposed faces
   std::uint64_t patches = 0;  ///< number of patches of the radiative exchange
   SolidStats stats;           ///< counters of the history, without the spin-up
   SolidStats spin_up;         ///< counters of the spin-up
   bool resumed = false;       ///< true if the run continued from a checkpoint
+  double spin_up_s = 0.0;     ///< length of the shaded history before the scenario's own
+  /// Keys of the scenario that this solution does not follow, one sentence each.
   std::vector<std::string> notes;
 };
+
+/// Point of the world at which temperatures are asked for.
+struct SolveProbe {
+  glm::dvec3 position_m{0.0};
+  std::optional<glm::dvec3> normal;  ///< out of the body; nothing takes the nearest surface's
+  std::string object;                ///< name of the object; empty takes any
+};
+
+/// Temperature at a probe.
+struct ProbedPoint {
+  double temperature_k = std::numeric_limits<double>::quiet_NaN();  ///< NaN: no surface is near
+  glm::dvec3 position_m{0.0};                                       ///< place on the surface
+  glm::dvec3 normal{0.0};
+  std::uint32_t object = 0;  ///< index into ScenarioDesc::objects
+};
+/// Largest distance of a probe from the surface that it stands for.
+inline constexpr double kProbeReachM = 0.02;
 
 /// Solver of a scenario's history, with any number of images along it. Owner: the caller. Thread:
 /// one at a time.
@@ -104,6 +129,10 @@ class SceneSolver {
   /// Returns the image at the instant reached (three dimensions), or at any instant up to end_ns
   /// (one dimension).
   [[nodiscard]] physics::Result<SolvedImage> image(const SolveView& view);
+  /// Returns the temperatures of the surface at probes, at the instants of image(). Errors:
+  /// those of image().
+  [[nodiscard]] physics::Result<std::vector<ProbedPoint>> probe(std::span<const SolveProbe> probes,
+                                                                std::int64_t sim_time_ns);
   [[nodiscard]] SolveReport report() const;
   /// Returns the temperatures of the grid's nodes at the instant reached. The result is empty in
   /// one dimension.

@@ -20,8 +20,10 @@
 /// sheets that face up are ground: below them lie the layers of their material, and below those its
 /// base_k. All other faces must close solids. A solid has the layers of its material from the open
 /// air inwards; its core, which lies deeper, is held at base_k. Around a cavity that the open air
-/// does not reach, the last layer extends to the cavity, whose walls are held at base_k. A solid
-/// and the ground below it share the nodes of their contact.
+/// does not reach, the last layer extends to the cavity, whose walls are held at base_k. A sheet
+/// is a solid of its thickness behind its front, without a core. Bodies that touch, and a body and
+/// the ground below it, share the nodes of their contact, unless a contact of the scenario puts a
+/// resistance there. Materials on one solid may differ in their optics.
 namespace emit::reference {
 
 struct VoxelShape;
@@ -56,15 +58,15 @@ struct VoxelFace {
 class VoxelModel {
  public:
   /// Builds the model. Errors: unsupported (moving objects, oblique or open faces, a solid of
-  /// several materials, an emitter of given temperature, too many nodes), config (a material
-  /// without layers), invalid_argument (options out of range). The message names object and
-  /// material.
+  /// materials with different layers, an emitter of given temperature, too many nodes), config (a
+  /// material without layers), invalid_argument (options out of range). The message names object
+  /// and material.
   [[nodiscard]] static physics::Result<VoxelModel> build(const scene::ScenarioDesc& scenario,
                                                          const scene::SceneGeometry& geometry,
                                                          const VoxelOptions& options);
-  /// Returns true if build() would accept the shape of the scene.
-  [[nodiscard]] static bool fits(const scene::ScenarioDesc& scenario,
-                                 const scene::SceneGeometry& geometry);
+  /// Checks if build() would accept the shape of the scene. Errors: those of build() for a shape.
+  [[nodiscard]] static physics::Result<void> fits(const scene::ScenarioDesc& scenario,
+                                                  const scene::SceneGeometry& geometry);
 
   [[nodiscard]] const SolidGrid& grid() const noexcept { return grid_; }
   /// Returns the boundary condition of a face, for SolidSolver::create().
@@ -73,6 +75,9 @@ class VoxelModel {
   [[nodiscard]] VoxelFace face(const SolidFace& face) const;
   /// Returns the temperature of the enclosure that in_cavity ground looks into.
   [[nodiscard]] double cavity_k() const noexcept { return cavity_k_; }
+
+  /// Returns the thickness of the thickest sheet, m; 0 without sheets.
+  [[nodiscard]] double thickest_sheet_m() const noexcept;
 
   /// Returns the temperature of a point at the start of a run. It depends on the depth below the
   /// nearest open face, along the steady profile of the material's layers from the initial
@@ -85,7 +90,9 @@ class VoxelModel {
   struct CellKind {
     std::uint32_t material = 0;  ///< index of the scene material
     bool ground = false;
+    std::uint32_t joint_of = 0xffffffffU;  ///< grid material that a joint's cells stand in
   };
+  [[nodiscard]] std::uint32_t cover_of(const SolidFace& face) const;
 
   SolidGrid grid_;
   std::vector<CellKind> kinds_;             ///< one entry per entry of grid_.materials
@@ -98,15 +105,17 @@ class VoxelModel {
 /// Finds the face of a model at a point of its surface.
 class FaceFinder {
  public:
-  /// Indexes the faces of a grid.
-  FaceFinder(const SolidGrid& grid, std::span<const SolidFace> faces);
+  /// Indexes the faces of a grid, whose thickest sheet is given in m.
+  FaceFinder(const SolidGrid& grid, std::span<const SolidFace> faces, double thickest_sheet_m);
   /// Returns the face at a point, or nothing. `normal` points out of the solid, along an axis. A
-  /// point between two faces belongs to either.
+  /// point between two faces belongs to either. A point on the front of a sheet and the normal of
+  /// its back give the face of the back.
   [[nodiscard]] std::optional<std::uint32_t> find(const glm::dvec3& point_m,
                                                   const glm::dvec3& normal) const;
 
  private:
   std::array<std::vector<double>, 3> lines_m_;
+  double thickest_sheet_m_ = 0.0;
   std::unordered_map<std::uint64_t, std::uint32_t> faces_;
 };
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -122,6 +123,13 @@ struct ObjectDesc {
   glm::dvec3 model_offset_m{0.0};  ///< of the model's origin in the body: forward, right, down
   Trajectory trajectory;  ///< entities only; empty: stays at its placement until the host moves it
   bool on = true;         ///< entities only: on state without a trajectory
+};
+
+/// Joint between two bodies that touch. Bodies that no contact names conduct to each other as if
+/// they were grown together.
+struct ContactDesc {
+  std::array<std::string, 2> between;  ///< each the name of an object or of a material
+  double resistance_m2k_w = 0.0;       ///< > 0
 };
 
 /// One camera. Its pixels are square; the vertical field of view follows from the format.
@@ -256,6 +264,7 @@ struct ScenarioDesc {
   std::vector<Material> materials;  ///< library plus the scenario's own
   std::string default_material;     ///< for glTF materials that nothing maps
   std::vector<ObjectDesc> objects;
+  std::vector<ContactDesc> contacts;  ///< only the reference solution in three dimensions has them
   SensorDesc sensor;
   std::vector<ChannelDesc> channels;
   ThermalOptions thermal;

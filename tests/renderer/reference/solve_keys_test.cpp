@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+// Keys of a scenario that the reference solution honours or refuses by name.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "emit/physics/constants.hpp"
+#include "emit/reference/solve.hpp"
+#include "solid_scenes.hpp"
+
+namespace emit::reference {
+namespace {
+
+/// Returns a wall and a plate of steel before it, which stand on ground, on a summer's forenoon.
+TestScene wall_scene() {
+  TestScene t;
+  scene::Material ground;
+  ground.name = "ground";
+  ground.solar_absorptance_frac = 0.8;
+  ground.emissivity_frac = 0.95;
+  ground.layers = {{0.10, 0.7, 2000.0, 900.0}};
+  ground.base_k = 290.0;
+  scene::Material wall = ground;
+  wall.name = "wall";
+  wall.layers = {{0.05, 1.2, 2200.0, 880.0}};
+  t.geometry.materials = {ground, wall};
+  scene::Mesh floor;
+  add_quad(floor, {{{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}}});
+  finish_mesh(t, std::move(floor), 0);
+  scene::Mesh body;
+  add_box(body, {-0.5, -0.1, 0.0}, {0.5, 0.1, 0.6});
+  finish_mesh(t, std::move(body), 1);
+  t.scenario.name = "keys";
+  t.scenario.place = {48.56 * physics::kDegree, 11.26 * physics::kDegree, 380.0};
+  t.scenario.epoch_utc_ns = 1403330400LL * 1'000'000'000LL;  // the date is 2014-06-21T06:00:00Z
+  t.scenario.materials = t.geometry.materials;
+  t.scenario.default_material = "ground";
+  t.scenario.bands = {{"8-12", 8.0, 12.0, {}}};
+  t.scenario.objects.resize(1);
+  t.scenario.objects[0].name = "scene";
+  t.scenario.thermal.initial_k = 290.0;
+  t.scenario.atmosphere.enabled = false;
+  return t;
+}
+
+SolveOptions quick_options() {
+  SolveOptions options;
+  options.refine = 0.15;
+  options.tolerance_k = 0.003;
+  options.rays = 64;
+  return options;
+}
+
+constexpr std::int64_t kEndNs = 3'600'000'000'000;
+/// Point of the ground before the south side of the wall.
+const SolveProbe kFoot{{0.0, -0.13, 0.0}, glm::dvec3(0.0, 0.0, 1.0), "scene"};
+
+double foot_k(const TestScene& t, const SolveOptions& options) {
+  auto solver = SceneSolver::create(t.scenario, t.geometry, options, kEndNs);
+  EXPECT_TRUE(solver.has_value()) << (solver ? "" : solver.error().text);
+  if (!solver) return std::nan("");
+  EXPECT_TRUE(solver->advance_to(kEndNs).has_value());
+  const auto points = solver->probe(std::span(&kFoot, 1), kEndNs);
+  EXPECT_TRUE(points.has_value());
+  return points ? (*points)[0].temperature_k : std::nan("");
+}
+
+TEST(ReferenceKeys, ExchangeSwitchedOffTakesTheWallForSurroundings) {
+  TestScene t = wall_scene();
+  const double with_k = foot_k(t, quick_options());
+  t.scenario.thermal.exchange = false;
+  const double without_k = foot_k(t, quick_options());
+  EXPECT_TRUE(std::isfinite(with_k + without_k));
+  EXPECT_GT(std::abs(with_k - without_k), 0.1);
+}
+
+TEST(ReferenceKeys, CheckpointOfAnotherKeyIsRefusedByName) {
+  TestScene t = wall_scene();
+  SolveOptions options = quick_options();
+  options.checkpoint =
+      std::filesystem::path(EMIT_TEST_BINARY_DIR) / "tests" / "reference_keys_checkpoint";
+  std::filesystem::remove_all(options.checkpoint);
+  ASSERT_TRUE(std::isfinite(foot_k(t, options)));
+  const auto refusal = [&](const TestScene& changed, const SolveOptions& with) -> std::string {
+    auto solver = SceneSolver::create(changed.scenario, changed.geometry, with, kEndNs);
+    if (!solver) return solver.error().text;
+    const auto reached = solver->advance_to(kEndNs);
+    return reached ? "" : reached.error().text;
+  };
+  EXPECT_EQ(refusal(t, options), "");
+  TestScene changed = t;
+  changed.scenario.thermal.exchange = false;
+  EXPECT_NE(refusal(changed, options).find("thermal.exchange"), std::string::npos);
+  changed = t;
+  changed.scenario.contacts = {{{"wall", "ground"}, 0.1}};
+  EXPECT_NE(refusal(changed, options).find("contacts"), std::string::npos);
+  changed = t;
+  changed.geometry.materials[1].initial_k = 280.0;
+  EXPECT_NE(refusal(changed, options).find("materials"), std::string::npos);
+  SolveOptions other = options;
+  other.rays = 65;
+  EXPECT_NE(refusal(t, other).find("rays"), std::string::npos);
+}
+
+TEST(ReferenceKeys, AutomaticDimensionSaysWhy) {
+  TestScene t = wall_scene();
+  SolveOptions options = quick_options();
+  const auto reason = [&](const TestScene& of) {
+    const auto solver = SceneSolver::create(of.scenario, of.geometry, options, kEndNs);
+    EXPECT_TRUE(solver.has_value());
+    return solver ? solver->report() : SolveReport{};
+  };
+  EXPECT_EQ(reason(t).dimension, 3);
+  EXPECT_NE(reason(t).reason.find("axis"), std::string::npos);
+  TestScene open = t;
+  open.geometry.meshes[1].submeshes[0].index_count -= 6;
+  EXPECT_EQ(reason(open).dimension, 1);
+  EXPECT_NE(reason(open).reason.find("object 'scene'"), std::string::npos);
+  ASSERT_EQ(reason(open).notes.size(), 1U);
+  EXPECT_NE(reason(open).notes[0].find("thermal.exchange"), std::string::npos);
+}
+
+TEST(ReferenceKeys, SpinUpKnowsTheShadeOfTheWall) {
+  // The ground just north of the wall lacks the sun of the forenoon, all of which lies in the
+  // spin-up.
+  TestScene t = wall_scene();
+  t.scenario.epoch_utc_ns += 5LL * 3600 * 1'000'000'000;
+  t.scenario.thermal.history_start_ns = 0;
+  t.scenario.thermal.spin_up_ns = 24LL * 3600 * 1'000'000'000;
+  SolveOptions options = quick_options();
+  options.spin_up_s = 24.0 * 3600.0;
+  const std::array<SolveProbe, 2> probes{{{{0.0, 0.13, 0.0}, glm::dvec3(0.0, 0.0, 1.0), ""},
+                                          {{0.0, 0.85, 0.0}, glm::dvec3(0.0, 0.0, 1.0), ""}}};
+  for (const SolveDimension dimension : {SolveDimension::three, SolveDimension::one}) {
+    options.dimension = dimension;
+    auto solver = SceneSolver::create(t.scenario, t.geometry, options, 0);
+    ASSERT_TRUE(solver.has_value()) << solver.error().text;
+    ASSERT_TRUE(solver->advance_to(0).has_value());
+    const auto points = solver->probe(probes, 0);
+    ASSERT_TRUE(points.has_value()) << points.error().text;
+    EXPECT_GT((*points)[1].temperature_k, (*points)[0].temperature_k + 3.0);
+    EXPECT_EQ(solver->report().spin_up_s, 24.0 * 3600.0);
+  }
+}
+
+TEST(ReferenceKeys, ProbeOfNothingIsNotANumber) {
+  const TestScene t = wall_scene();
+  auto solver = SceneSolver::create(t.scenario, t.geometry, quick_options(), 0);
+  ASSERT_TRUE(solver.has_value());
+  ASSERT_TRUE(solver->advance_to(0).has_value());
+  std::array<SolveProbe, 3> probes{};
+  probes[0].position_m = {0.0, 0.0, 2.0};
+  probes[1].position_m = {0.0, 0.0, 0.605};
+  probes[2] = probes[1];
+  probes[2].normal = glm::dvec3(0.0, 1.0, 0.0);
+  const auto points = solver->probe(probes, 0);
+  ASSERT_TRUE(points.has_value());
+  EXPECT_TRUE(std::isnan((*points)[0].temperature_k));
+  EXPECT_NEAR((*points)[1].position_m.z, 0.6, 1e-6);
+  EXPECT_NEAR((*points)[1].temperature_k, 290.0, 1e-6);
+  EXPECT_TRUE(std::isnan((*points)[2].temperature_k));
+}
+
+}  // namespace
+}  // namespace emit::reference
