@@ -37,7 +37,8 @@ void StepPlan::snap_to(std::span<const std::int64_t> events_ns) noexcept {
 }
 
 void StepPlan::update(std::int64_t now_ns, const Environment& environment,
-                      std::span<const PoseHistory> entities) noexcept {
+                      std::span<const PoseHistory> entities,
+                      std::span<const PartHistory> parts) noexcept {
   if (options_.spacing == scene::StepSpacing::uniform) {
     physics::uniform_step_nodes(options_.history_start_ns, now_ns, nodes_ns_);
   } else {
@@ -47,6 +48,7 @@ void StepPlan::update(std::int64_t now_ns, const Environment& environment,
   std::fill(snapped_.begin(), snapped_.end(), false);
   for (const PoseHistory& entity : entities) snap_to(entity.events_ns());
   snap_to(environment.changes_ns());
+  for (const PartHistory& part : parts) snap_to(part.events_ns());
 
   physics::SunPosition sun = environment.sun_at(nodes_ns_.front());
   physics::Forcing forcing = environment.forcing_at(nodes_ns_.front(), sun);

@@ -6,6 +6,7 @@
 
 #include "emit/scene/scene_desc.hpp"
 #include "history/environment.hpp"
+#include "history/part_history.hpp"
 #include "history/pose_history.hpp"
 
 namespace emit::renderer {
@@ -26,7 +27,7 @@ struct HistoryInterval {
 /// Intervals from the history's start to a frame's instant, in order of time. Their number is fixed
 /// (thermal.steps). The closest inner node moves onto every event of an entity (appears, vanishes,
 /// starts, stops), so that a parked vehicle's shade begins and ends on time. The same holds for
-/// every change of the weather by the host. Owner: Renderer.
+/// every change of the weather by the host, and for every command of a part. Owner: Renderer.
 /// Thread: the renderer's.  Real time: update is RT-safe.
 class StepPlan {
  public:
@@ -34,7 +35,8 @@ class StepPlan {
 
   /// Computes the intervals up to `now_ns`.
   void update(std::int64_t now_ns, const Environment& environment,
-              std::span<const PoseHistory> entities) noexcept;
+              std::span<const PoseHistory> entities,
+              std::span<const PartHistory> parts = {}) noexcept;
 
   [[nodiscard]] std::span<const HistoryInterval> intervals() const noexcept { return intervals_; }
   /// Returns the sun and the weather at the frame's instant.

@@ -54,6 +54,16 @@ constexpr std::size_t kMaxPlanes = EMIT_MAX_BANDS + 3;
 Result<void> check_limits(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
   const scene::ThermalOptions& thermal = scenario.thermal;
   const auto fail = [](std::string text) { return make_error(ErrorCode::config, std::move(text)); };
+  for (const scene::ObjectDesc& object : scenario.objects) {
+    if (object.parts.empty() || (thermal.method == scene::ThermalMethod::cached &&
+                                 thermal.model == scene::ThermalModel::foster)) {
+      continue;
+    }
+    return fail(fmt::format(
+        "object '{}' has parts: they need thermal.method = \"cached\" and thermal.model = "
+        "\"foster\"",
+        object.name));
+  }
   if (!limits::kSensorPx.contains(scenario.sensor.width_px) ||
       !limits::kSensorPx.contains(scenario.sensor.height_px)) {
     return fail(fmt::format("sensor format {} x {}: {} to {} pixels are possible",
@@ -110,6 +120,7 @@ class GlRenderer final : public Renderer {
 
   std::size_t apply_entities(std::int64_t sim_time_ns,
                              std::span<const EntityUpdate> updates) noexcept override;
+  bool apply_part(std::int64_t sim_time_ns, const PartUpdate& update) noexcept override;
   bool apply_weather(const scene::WeatherSample& sample) noexcept override {
     return history_.environment.append(sample);
   }
@@ -238,7 +249,7 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
       scene_stats_{.triangles = geometry.triangles,
                    .instances = static_cast<std::uint32_t>(geometry.instances.size()),
                    .warnings = scenario.warnings},
-      history_{Environment(scenario), {}},
+      history_{Environment(scenario), {}, {}},
       bands_(std::move(bands)),
       passes_(std::move(passes)),
       frame_buffer_(gl::Buffer::dynamic(sizeof(gpu::FrameParams))),
@@ -265,6 +276,7 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
     entity_ids_.push_back(object.entity_id);
     history_.entities.emplace_back(object, object.instances.front());
   }
+  history_.parts = make_part_histories(scenario_, geometry, scene_stats_.warnings);
   const std::size_t plane_px = std::size_t{scenario_.sensor.width_px} * scenario_.sensor.height_px;
   // Set the parameters that all frames share.
   frame_params_.output_px = glm::uvec2(scenario_.sensor.width_px, scenario_.sensor.height_px);
@@ -314,7 +326,18 @@ std::size_t GlRenderer::apply_entities(std::int64_t sim_time_ns,
   return applied;
 }
 
+bool GlRenderer::apply_part(std::int64_t sim_time_ns, const PartUpdate& update) noexcept {
+  const int entity = find_entity(update.entity_id);
+  bool applied = false;
+  for (PartHistory& part : history_.parts) {
+    if (static_cast<int>(part.entity()) != entity || part.id() != update.part_id) continue;
+    applied = part.append(sim_time_ns, update.command) || applied;
+  }
+  return applied;
+}
+
 void GlRenderer::reset() noexcept {
+  for (PartHistory& part : history_.parts) part.reset();
   for (PoseHistory& history : history_.entities) history.reset();
   history_.environment.reset();
 }

@@ -172,7 +172,7 @@ CachedStage::CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb&
 physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
                                            const WarmUpProgress& progress) {
   // Sample the surface for the camera and integrate its history, or read the state file.
-  const CachedSurface::Inputs inputs{history_.environment, history_.entities};
+  const CachedSurface::Inputs inputs{history_.environment, history_.entities, history_.parts};
   const RefineView view = refine_view(sensor_, request);
   if (saved_) {
     const RefineView::Eye here = view.eyes.front();
@@ -208,7 +208,8 @@ physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
 
 physics::Result<void> CachedStage::carry_on(const FrameRequest& to,
                                             const WarmUpProgress& progress) {
-  return surface_->carry_on(to.thermal_time_ns, {history_.environment, history_.entities},
+  return surface_->carry_on(to.thermal_time_ns,
+                            {history_.environment, history_.entities, history_.parts},
                             surface_history_, progress);
 }
 
@@ -249,7 +250,7 @@ void CachedStage::describe(SceneStats& stats) const noexcept {
 
 void CachedStage::prepare(const FrameRequest& request, CameraSetup& camera,
                           gpu::FrameParams& frame) noexcept {
-  const CachedSurface::Inputs inputs{history_.environment, history_.entities};
+  const CachedSurface::Inputs inputs{history_.environment, history_.entities, history_.parts};
   // Advance the samples to the thermal instant.
   surface_->advance(request.thermal_time_ns, inputs, surface_history_);
   // Place the shadows of entities at their poses of the frame.

@@ -11,6 +11,7 @@
 #include "emit/renderer/renderer.hpp"
 #include "gl/objects.hpp"
 #include "history/environment.hpp"
+#include "history/part_history.hpp"
 #include "history/pose_history.hpp"
 #include "shared/frame_params.glsl.h"
 #include "stages/drawn_scene.hpp"
@@ -37,6 +38,7 @@ class StageClock {
 struct SceneHistory {
   Environment environment;
   std::vector<PoseHistory> entities;
+  std::vector<PartHistory> parts;  ///< ascending by entity
 };
 
 /// Method that computes surface temperatures (thermal.method). It owns the geometry that is drawn,
@@ -93,6 +95,12 @@ class ThermalStage {
   /// Issues the passes between geometry and radiance. The window of the frame has `size_px` pixels.
   virtual void draw(const glm::uvec2& size_px, StageTimes& stages, StageClock& clock) noexcept = 0;
 };
+
+/// Makes the histories of the parts of all entities, ascending by entity: one for each material of
+/// the geometry that a part has. A part without surfaces adds a line to `warnings`. It allocates.
+[[nodiscard]] std::vector<PartHistory> make_part_histories(const scene::ScenarioDesc& scenario,
+                                                           const scene::SceneGeometry& geometry,
+                                                           std::vector<std::string>& warnings);
 
 /// Entry of SceneHistory::entities for each object of the scenario; -1 for a static object.
 [[nodiscard]] std::vector<std::int32_t> histories_of_objects(const scene::ScenarioDesc& scenario);

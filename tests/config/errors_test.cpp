@@ -18,6 +18,10 @@ std::string object(const std::string& more) {
 std::string material(const std::string& more) {
   return "[[material]]\nname = \"x\"\nsolar_absorptance_frac = 0.5\nemissivity_frac = 0.9\n" + more;
 }
+/// Entity with a part.
+std::string part(const std::string& keys) {
+  return object("entity_id = 7\n[[object.parts]]\nname = \"a\"\n" + keys);
+}
 const std::string kLayer =
     "layers = [{ thickness_m = 0.1, conductivity_w_m_k = 1, density_kg_m3 = 2000, "
     "specific_heat_j_kg_k = 900 }]\n";
@@ -80,6 +84,26 @@ const std::vector<Case>& cases() {
        "s.toml:4:12: there is no material 'concret', did you mean 'concrete'?"},
       {"material_map", object("material_map = { body = \"gold\" }\n"),
        "s.toml:4:25: there is no material 'gold'"},
+      {"parts_of_scenery", object("parts = [{ name = \"a\", material = \"concrete\" }]\n"),
+       "s.toml:4:9: 'parts' needs an entity_id: static scenery does not heat itself"},
+      {"part_material", part("material = \"gold\"\n"), "s.toml:7:12: there is no material 'gold'"},
+      {"part_twice",
+       part("material = \"concrete\"\n") +
+           "[[object.parts]]\nname = \"b\"\nmaterial = \"concrete\"\n",
+       "s.toml:8:1: part 'b' has the id, name or material of part 'a'"},
+      {"part_half_a_curve", part("material = \"concrete\"\nidle_k = 300\n"),
+       "s.toml:5:1: 'idle_k' and 'full_k' go together"},
+      {"part_throttle_without_curve",
+       part("material = \"concrete\"\ncommands = [{ time_s = 0, throttle = 1 }]\n"),
+       "s.toml:8:38: 'throttle' needs idle_k and full_k of part 'a'"},
+      {"part_two_drives",
+       part("material = \"concrete\"\ncommands = [{ time_s = 0, power_w_m2 = 1, off = true }]\n"),
+       "s.toml:8:13: a command needs exactly one of 'temperature_k', 'power_w_m2', 'throttle' and "
+       "'off = true'"},
+      {"part_commands_descend",
+       part("material = \"concrete\"\n"
+            "commands = [{ time_s = 1, power_w_m2 = 1 }, { time_s = 1, off = true }]\n"),
+       "s.toml:8:56: 'time_s' is not later than in the command before"},
       {"default_material_misspelt", "default_material = \"concret\"\n",
        "s.toml:2:20: there is no material 'concret', did you mean 'concrete'?"},
       {"surroundings_material_misspelt", "[thermal]\nsurroundings_material = \"concret\"\n",

@@ -144,6 +144,26 @@ trajectory = [
   { time_s = -1.0, position_m = [0.0, 0.0, 100.0], heading_deg = 90.0, on = false },
   { time_s = 4.0, position_m = [50.0, 0.0, 100.0], heading_deg = 100.0, teleport = true },
 ]
+[[object.parts]]
+name = "engine"
+material = "concrete"
+id = 9
+idle_k = 350.5
+full_k = 450.25
+cold_k = 280.5
+up_s = 60.5
+down_s = 300.25
+commands = [
+  { time_s = -1.0, throttle = 0.25 },
+  { time_s = 2.5, off = true },
+]
+[[object.parts]]
+name = "pipe"
+material = "deep"
+commands = [
+  { time_s = 0.0, temperature_k = 600.5 },
+  { time_s = 1.5, power_w_m2 = 900.25 },
+]
 
 [[material]]
 name = "hot"
@@ -261,6 +281,27 @@ TEST_F(ConfigTest, every_scenario_key_reaches_its_field) {
   ASSERT_EQ(s.objects[2].trajectory.size(), 2U);
   EXPECT_FALSE(s.objects[2].trajectory[0].on);
   EXPECT_TRUE(s.objects[2].trajectory[1].teleport);
+  ASSERT_EQ(s.objects[2].parts.size(), 2U);
+  using Kind = scene::PartCommand::Kind;
+  const scene::PartDesc& engine = s.objects[2].parts[0];
+  EXPECT_EQ(engine.id, 9U);
+  EXPECT_EQ(engine.name, "engine");
+  EXPECT_EQ(engine.material, "concrete");
+  EXPECT_TRUE(engine.curve.given);
+  EXPECT_EQ(engine.curve.idle_k, 350.5);
+  EXPECT_EQ(engine.curve.full_k, 450.25);
+  EXPECT_EQ(engine.curve.cold_k, 280.5);
+  EXPECT_EQ(engine.curve.up_s, 60.5);
+  EXPECT_EQ(engine.curve.down_s, 300.25);
+  ASSERT_EQ(engine.commands.size(), 2U);
+  EXPECT_EQ(engine.commands[0].sim_time_ns, -1'000'000'000);
+  EXPECT_EQ(engine.commands[0].command, (scene::PartCommand{Kind::throttle, 0.25}));
+  EXPECT_EQ(engine.commands[1].command, (scene::PartCommand{Kind::off, 0.0}));
+  const scene::PartDesc& pipe = s.objects[2].parts[1];
+  EXPECT_EQ(pipe.id, 2U) << "its place in the list";
+  EXPECT_FALSE(pipe.curve.given);
+  EXPECT_EQ(pipe.commands[0].command, (scene::PartCommand{Kind::temperature, 600.5}));
+  EXPECT_EQ(pipe.commands[1].command, (scene::PartCommand{Kind::power, 900.25}));
   ASSERT_EQ(s.materials.size(), 3U);  // the library's concrete first
   EXPECT_EQ(s.materials[1].prescribed_k, 450.5);
   EXPECT_EQ(s.materials[1].source, "s \"quoted\"");

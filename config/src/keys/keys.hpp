@@ -29,8 +29,22 @@ struct KeyframeDraft {
   bool on = true;
   bool teleport = false;
 };
+struct PartCommandDraft {
+  std::int64_t time_ns = 0;
+  std::optional<double> temperature_k;
+  std::optional<double> power_w_m2;
+  std::optional<double> throttle;
+  bool off = false;
+};
+struct PartDraft {
+  scene::PartDesc desc;
+  std::optional<double> idle_k;
+  std::optional<double> full_k;
+  std::vector<PartCommandDraft> commands;
+};
 struct ObjectDraft {
   scene::ObjectDesc desc;
+  std::vector<PartDraft> parts;
   PoseDraft pose;
   std::vector<InstanceDraft> instances;
   std::vector<KeyframeDraft> trajectory;
@@ -88,6 +102,8 @@ struct DaemonHead {
 [[nodiscard]] const KeyTable<scene::ContactDesc>& contact_keys();
 [[nodiscard]] const KeyTable<InstanceDraft>& instance_keys();
 [[nodiscard]] const KeyTable<KeyframeDraft>& keyframe_keys();
+[[nodiscard]] const KeyTable<PartCommandDraft>& part_command_keys();
+[[nodiscard]] const KeyTable<PartDraft>& part_keys();
 [[nodiscard]] const KeyTable<scene::Material>& material_keys();
 [[nodiscard]] const KeyTable<scene::Layer>& layer_keys();
 [[nodiscard]] const KeyTable<scene::RelaxationMode>& mode_keys();

@@ -145,6 +145,54 @@ const KeyTable<KeyframeDraft>& keyframe_keys() {
   return keys;
 }
 
+const KeyTable<PartCommandDraft>& part_command_keys() {
+  static const KeyTable<PartCommandDraft> keys = {
+      required(nanoseconds<PartCommandDraft>("time_s", "s", 1e9, between(-1e9, 1e9),
+                                             EMIT_FIELD(time_ns), "Sim time; ascending.")),
+      number<PartCommandDraft>("temperature_k", "K", between(50, 3000), EMIT_FIELD(temperature_k),
+                               "Temperature at which the skin is held."),
+      number<PartCommandDraft>("power_w_m2", "W m-2", between(0, 1e6), EMIT_FIELD(power_w_m2),
+                               "Power into the skin."),
+      number<PartCommandDraft>("throttle", "", between(0, 1), EMIT_FIELD(throttle),
+                               "0: idle_k, 1: full_k, reached with up_s and down_s."),
+      boolean<PartCommandDraft>("off", EMIT_FIELD(off),
+                                "A part with idle_k and full_k cools to cold_k with down_s; the "
+                                "skin of another is let go."),
+  };
+  return keys;
+}
+
+const KeyTable<PartDraft>& part_keys() {
+  static const KeyTable<PartDraft> keys = {
+      integer<PartDraft>("id", "", 1, 65535, EMIT_FIELD(desc.id),
+                         "Number by which hosts name the part; absent: its place in the list, "
+                         "from 1 on."),
+      required(text<PartDraft>("name", EMIT_FIELD(desc.name), "Name, unique in the object.")),
+      required(text<PartDraft>("material", EMIT_FIELD(desc.material),
+                               "Library material. All surfaces of the object with it are the "
+                               "part.")),
+      number<PartDraft>("idle_k", "K", between(50, 3000), EMIT_FIELD(idle_k),
+                        "Temperature behind the skin at throttle 0; with full_k."),
+      number<PartDraft>("full_k", "K", between(50, 3000), EMIT_FIELD(full_k),
+                        "Temperature behind the skin at throttle 1; with idle_k."),
+      number<PartDraft>("cold_k", "K", between(50, 3000), EMIT_FIELD(desc.curve.cold_k),
+                        "Temperature behind the skin before the first command and long after off."),
+      number<PartDraft>("up_s", "s", between(0, 1e6), EMIT_FIELD(desc.curve.up_s),
+                        "Time constant of warming; 0: at once."),
+      number<PartDraft>("down_s", "s", between(0, 1e6), EMIT_FIELD(desc.curve.down_s),
+                        "Time constant of cooling; 0: at once."),
+      custom<PartDraft>(
+          {"commands", "array of tables", "", "ascending in time",
+           "What drives the part: see `commands` below. Nothing does before the first.", false},
+          [](PartDraft& out, const Node& node, Diagnostics& diagnostics) {
+            read_array(node, "commands", part_command_keys(), PartCommandDraft{}, out.commands,
+                       diagnostics);
+          },
+          [](const PartDraft& in) { return write_array(in.commands, part_command_keys()); }),
+  };
+  return keys;
+}
+
 const KeyTable<scene::ContactDesc>& contact_keys() {
   using scene::ContactDesc;
   static const KeyTable<ContactDesc> keys = {
@@ -228,6 +276,13 @@ const KeyTable<ObjectDraft>& object_keys() {
         },
         [](const ObjectDraft& in) { return write_array(in.instances, instance_keys()); }));
     append_trajectory_keys(table);
+    table.push_back(custom<ObjectDraft>(
+        {"parts", "array of tables", "", "",
+         "Entities: parts that heat themselves, such as an exhaust; see `parts` below.", false},
+        [](ObjectDraft& out, const Node& node, Diagnostics& diagnostics) {
+          read_array(node, "parts", part_keys(), PartDraft{}, out.parts, diagnostics);
+        },
+        [](const ObjectDraft& in) { return write_array(in.parts, part_keys()); }));
     return table;
   }();
   return keys;

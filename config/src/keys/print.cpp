@@ -24,6 +24,35 @@ std::vector<KeyframeDraft> drafts_of(const scene::Trajectory& trajectory) {
   return drafts;
 }
 
+PartDraft draft_of(const scene::PartDesc& part) {
+  PartDraft draft;
+  draft.desc = part;
+  if (part.curve.given) {
+    draft.idle_k = part.curve.idle_k;
+    draft.full_k = part.curve.full_k;
+  }
+  for (const auto& [time_ns, command] : part.commands) {
+    PartCommandDraft out;
+    out.time_ns = time_ns;
+    switch (command.kind) {
+      case scene::PartCommand::Kind::off:
+        out.off = true;
+        break;
+      case scene::PartCommand::Kind::temperature:
+        out.temperature_k = command.value;
+        break;
+      case scene::PartCommand::Kind::power:
+        out.power_w_m2 = command.value;
+        break;
+      case scene::PartCommand::Kind::throttle:
+        out.throttle = command.value;
+        break;
+    }
+    draft.commands.push_back(out);
+  }
+  return draft;
+}
+
 template <class T>
 bool is_pose_key(const Key<T>& key) {
   for (const Key<InstanceDraft>& pose_key : instance_keys()) {
@@ -56,6 +85,7 @@ void print_object(const scene::ObjectDesc& object, std::string& out) {
   ObjectDraft draft;
   draft.desc = object;
   draft.trajectory = drafts_of(object.trajectory);
+  for (const scene::PartDesc& part : object.parts) draft.parts.push_back(draft_of(part));
   const bool pose_at_object = object.instances.size() == 1;
   if (pose_at_object) {
     draft.pose = draft_of(object.instances.front());

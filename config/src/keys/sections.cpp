@@ -45,6 +45,15 @@ const std::vector<SectionDoc>& scenario_sections() {
                   "A keyframe of an object or of the sensor (`[[sensor.trajectory]]`). The first "
                   "pose holds before it, the last one after it.",
                   keyframe_keys(), KeyframeDraft{}),
+      section_doc("object.parts", true,
+                  "A part of an entity that heats itself. Heat flows from its skin into the body, "
+                  "and radiation from it to what stands near. It needs `thermal.method` cached and "
+                  "`thermal.model` foster.",
+                  part_keys(), PartDraft{}),
+      section_doc("object.parts.commands", true,
+                  "What drives a part from an instant on: one of `temperature_k`, `power_w_m2`, "
+                  "`throttle` and `off = true`.",
+                  part_command_keys(), PartCommandDraft{}),
       section_doc("contact", true,
                   "A joint with a thermal resistance between bodies that touch. Bodies that touch "
                   "without one conduct to each other as if grown together. Only `emit solve` in "

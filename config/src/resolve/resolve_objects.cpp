@@ -142,6 +142,88 @@ std::string unique_name(const std::string& stem, const std::vector<ObjectDesc>& 
   return name;
 }
 
+/// Commands of a part, from the items of its list `commands`.
+std::vector<scene::TimedPartCommand> resolve_commands(const PartDraft& draft, const Node& node,
+                                                      Diagnostics& diagnostics) {
+  using Kind = scene::PartCommand::Kind;
+  std::vector<scene::TimedPartCommand> out;
+  const Node* list = node.find("commands");
+  if (list == nullptr || list->items.size() != draft.commands.size()) {
+    return out;  // absent, or reported while reading
+  }
+  for (std::size_t i = 0; i < draft.commands.size(); ++i) {
+    const PartCommandDraft& in = draft.commands[i];
+    const Node& item = list->items[i];
+    std::vector<scene::PartCommand> given;
+    if (in.temperature_k) given.push_back({Kind::temperature, *in.temperature_k});
+    if (in.power_w_m2) given.push_back({Kind::power, *in.power_w_m2});
+    if (in.throttle) given.push_back({Kind::throttle, *in.throttle});
+    if (in.off) given.push_back({Kind::off, 0.0});
+    if (given.size() != 1) {
+      diagnostics.add(item.at,
+                      "a command needs exactly one of 'temperature_k', 'power_w_m2', 'throttle' "
+                      "and 'off = true'");
+      continue;
+    }
+    if (in.throttle && !(draft.idle_k && draft.full_k)) {
+      diagnostics.add(
+          key_location(item, "throttle"),
+          fmt::format("'throttle' needs idle_k and full_k of part '{}'", draft.desc.name));
+    }
+    if (!out.empty() && in.time_ns <= out.back().sim_time_ns) {
+      diagnostics.add(key_location(item, "time_s"),
+                      "'time_s' is not later than in the command before");
+    }
+    out.push_back({in.time_ns, given.front()});
+  }
+  return out;
+}
+
+/// Parts of an object, from the items of its list `parts`.
+std::vector<scene::PartDesc> resolve_parts(const ObjectDraft& draft, const Node& node,
+                                           const std::vector<Material>& materials,
+                                           Diagnostics& diagnostics) {
+  std::vector<scene::PartDesc> out;
+  const Node* list = node.find("parts");
+  if (list == nullptr || list->items.size() != draft.parts.size()) {
+    return out;  // absent, or reported while reading
+  }
+  if (draft.desc.entity_id == 0) {
+    diagnostics.add(key_location(node, "parts"),
+                    "'parts' needs an entity_id: static scenery does not heat itself");
+  }
+  for (std::size_t i = 0; i < draft.parts.size(); ++i) {
+    const PartDraft& in = draft.parts[i];
+    const Node& item = list->items[i];
+    scene::PartDesc part = in.desc;
+    if (item.find("id") == nullptr) part.id = static_cast<std::uint32_t>(i + 1);
+    check_material_name(part.material, materials, key_location(item, "material"), diagnostics);
+    for (const Material& material : materials) {
+      if (material.name == part.material && material.prescribed_k) {
+        diagnostics.add(key_location(item, "material"),
+                        fmt::format("material '{}' has prescribed_k, so that no command has an "
+                                    "effect on it",
+                                    part.material));
+      }
+    }
+    for (const scene::PartDesc& other : out) {
+      if (other.id == part.id || other.name == part.name || other.material == part.material) {
+        diagnostics.add(item.at, fmt::format("part '{}' has the id, name or material of part '{}'",
+                                             part.name, other.name));
+      }
+    }
+    if (in.idle_k.has_value() != in.full_k.has_value()) {
+      diagnostics.add(item.at, "'idle_k' and 'full_k' go together");
+    }
+    part.curve.given = in.idle_k && in.full_k;
+    part.curve.idle_k = in.idle_k.value_or(0.0);
+    part.curve.full_k = in.full_k.value_or(0.0);
+    part.commands = resolve_commands(in, item, diagnostics);
+    out.push_back(std::move(part));
+  }
+  return out;
+}
+
 ObjectDesc resolve_object(const Node& node, const std::vector<ObjectDesc>& before,
                           const std::vector<Material>& materials, bool require_files,
                           Diagnostics& diagnostics) {
@@ -195,6 +277,7 @@ ObjectDesc resolve_object(const Node& node, const std::vector<ObjectDesc>& befor
     }
   }
   resolve_placement(draft, node, desc, diagnostics);
+  desc.parts = resolve_parts(draft, node, materials, diagnostics);
   return desc;
 }
 

@@ -40,7 +40,7 @@ std::optional<Material> sheet_of(const Material& material) {
   }
   if (resistance_m2k_w > kMaxSheetResistanceM2kW) return std::nullopt;
   sheet.sheet = true;
-  sheet.name += " (sheet)";
+  sheet.name = sheet_name(sheet.name);
   sheet.modes = {{capacity_j_m2_k / kFilmW_m2_k, 1.0}};
   sheet.foster_modes.clear();
   sheet.foster_fit.reset();

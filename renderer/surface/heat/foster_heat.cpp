@@ -104,16 +104,25 @@ FosterHeat::Incoming FosterHeat::into_body(const Incoming& own, bool own_covered
 }
 
 FosterDrive<double> FosterHeat::absorbed(std::uint32_t material, const SurfaceForcing& forcing,
-                                         const Incoming& in) const noexcept {
-  return {.absorbed_w_m2 = materials_[material].solar_absorptance_frac * in.shortwave_w_m2 +
-                           materials_[material].emissivity_frac * in.longwave_w_m2,
-          .film_w_m2_k = forcing.film_w_m2_k,
-          .air_offset_k = forcing.air_k - reference_k_};
+                                         const Incoming& in, const PartHeat& part) const noexcept {
+  FosterDrive<double> drive{
+      .absorbed_w_m2 = materials_[material].solar_absorptance_frac * in.shortwave_w_m2 +
+                       materials_[material].emissivity_frac * in.longwave_w_m2 + part.power_w_m2,
+      .film_w_m2_k = forcing.film_w_m2_k,
+      .air_offset_k = forcing.air_k - reference_k_};
+  if (part.contact_w_m2_k > 0.0) {
+    // Join film and contact to one conductance, to the mean temperature of their far ends.
+    const double film_w_m2 = drive.film_w_m2_k * drive.air_offset_k;
+    const double contact_w_m2 = part.contact_w_m2_k * (part.behind_k - reference_k_);
+    drive.film_w_m2_k += part.contact_w_m2_k;
+    drive.air_offset_k = (film_w_m2 + contact_w_m2) / drive.film_w_m2_k;
+  }
+  return drive;
 }
 
 SampleOutput FosterHeat::output_of(const SurfaceSample& sample, const SurfaceForcing& forcing,
                                    const Incoming& in, const SampleDrive& drive,
-                                   double offset_k) const noexcept {
+                                   const PartHeat& part, double offset_k) const noexcept {
   const FosterMaterial& m = materials_[sample.material];
   SampleOutput out;
   out.offset_k = static_cast<float>(offset_k);
@@ -126,7 +135,7 @@ SampleOutput FosterHeat::output_of(const SurfaceSample& sample, const SurfaceFor
   // Give the net flux to partners, which it drives. A covered face has none.
   if (!m.prescribed() && !sample.covered) {
     out.flux_w_m2 = static_cast<float>(physics::foster_flux_w_m2(
-        offset_k, absorbed(sample.material, forcing, in), surfaces_[sample.material]));
+        offset_k, absorbed(sample.material, forcing, in, part), surfaces_[sample.material]));
   }
   return out;
 }
@@ -143,7 +152,7 @@ SampleOutput FosterHeat::output(const SurfaceSample& sample, const glm::vec3& no
                                 const SurfaceForcing& forcing, const SampleDrive& drive,
                                 const SampleState& state) const noexcept {
   const Incoming in = incoming(sample, normal, forcing, drive, drive.longwave_begin_w_m2);
-  return output_of(sample, forcing, in, drive, offset_k(sample.material, state));
+  return output_of(sample, forcing, in, drive, drive.part.begin, offset_k(sample.material, state));
 }
 
 bool FosterHeat::begin_advance(const SampleAdvance& each, const HeatInterval& interval,
@@ -182,8 +191,8 @@ bool FosterHeat::begin_advance(const SampleAdvance& each, const HeatInterval& in
     return false;
   }
   lane.x = &each.state->modes_k;
-  lane.begin = absorbed(sample.material, forcing.begin, body_begin);
-  lane.end = absorbed(sample.material, forcing.end, body_end);
+  lane.begin = absorbed(sample.material, forcing.begin, body_begin, drive.part.begin);
+  lane.end = absorbed(sample.material, forcing.end, body_end, drive.part.end);
   return true;
 }
 
@@ -204,7 +213,7 @@ void FosterHeat::advance_group(std::span<SampleAdvance> group,
   physics::foster_advance_all(std::span(lanes).first(count), tolerance_k_);
   for (std::size_t i = 0; i < group.size(); ++i) {
     SampleAdvance& each = group[i];
-    each.output = output_of(*each.sample, at_end, ends[i], each.drive,
+    each.output = output_of(*each.sample, at_end, ends[i], each.drive, each.drive.part.end,
                             offset_k(each.sample->material, *each.state));
   }
 }

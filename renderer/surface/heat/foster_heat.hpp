@@ -81,14 +81,16 @@ class FosterHeat {
   /// Advances up to `most` samples.
   template <std::size_t most>
   void advance_group(std::span<SampleAdvance> group, const HeatInterval& interval) const noexcept;
-  /// Returns the input of the surface balance: absorbed flux A, film and air.
+  /// Returns the input of the surface balance: absorbed flux A, film and air, with the heat of a
+  /// part.
   [[nodiscard]] physics::FosterDrive<double> absorbed(std::uint32_t material,
                                                       const SurfaceForcing& forcing,
-                                                      const Incoming& in) const noexcept;
+                                                      const Incoming& in,
+                                                      const PartHeat& part) const noexcept;
   /// Returns the output of a sample of known temperature.
   [[nodiscard]] SampleOutput output_of(const SurfaceSample& sample, const SurfaceForcing& forcing,
                                        const Incoming& in, const SampleDrive& drive,
-                                       double offset_k) const noexcept;
+                                       const PartHeat& part, double offset_k) const noexcept;
   /// Returns the surface temperature as an offset from the reference temperature, partners
   /// included.
   [[nodiscard]] double offset_k(std::uint32_t material, const SampleState& state) const noexcept;

@@ -1,19 +1,53 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <glm/ext/vector_float3.hpp>
+#include <span>
 #include <vector>
 
 #include "emit/physics/foster.hpp"
 #include "emit/physics/relaxation.hpp"
 #include "emit/renderer/surface_forcing.hpp"
+#include "history/part_history.hpp"
 #include "surface/heat/surface_samples.hpp"
 
 namespace emit::renderer {
 
 /// Largest number of relaxation modes of a material (physics.md eq. 5). Further modes are ignored.
 inline constexpr std::size_t kMaxRelaxationModes = 2;
+
+/// Drives of the parts over an interval, by entity and material. Plain data; find() is RT-safe.
+struct PartForcing {
+  struct Part {
+    std::size_t entity = 0;
+    std::uint32_t material = 0;
+    PartHeatSpan heat;
+  };
+  std::vector<Part> parts;  ///< ascending by entity
+
+  /// Returns the drive of the samples of an entity with a material; null if no part has them.
+  [[nodiscard]] const Part* find(const SurfaceSample& sample) const noexcept {
+    if (sample.entity < 0 || parts.empty()) return nullptr;
+    const auto entity = static_cast<std::size_t>(sample.entity);
+    auto part = std::ranges::lower_bound(parts, entity, {}, &Part::entity);
+    for (; part != parts.end() && part->entity == entity; ++part) {
+      if (part->material == sample.material) return &*part;
+    }
+    return nullptr;
+  }
+  /// Sets the drives for an interval, of the same parts in the same order. It allocates the first
+  /// time.
+  void update(std::span<const PartHistory> histories, std::int64_t begin_ns, std::int64_t end_ns) {
+    parts.resize(histories.size());
+    for (std::size_t i = 0; i < histories.size(); ++i) {
+      parts[i] = {histories[i].entity(), histories[i].material(),
+                  histories[i].over(begin_ns, end_ns)};
+    }
+  }
+};
 
 /// Input of one sample over one interval, in addition to the forcing that all samples share.
 struct SampleDrive {
@@ -32,6 +66,13 @@ struct SampleDrive {
   /// eq. 22).
   std::array<double, kMaxPartners> partner_begin_w_m2{};
   std::array<double, kMaxPartners> partner_end_w_m2{};
+  /// Heat of the part that the sample belongs to (physics.md eq. 27).
+  PartHeatSpan part;
+
+  /// Takes the heat of the sample's part from the forcing of an interval.
+  void take_part(const PartForcing& parts, const SurfaceSample& sample) noexcept {
+    if (const PartForcing::Part* found = parts.find(sample)) part = found->heat;
+  }
 };
 
 /// State of the air and the surface around which a step response is linearised.
@@ -66,6 +107,7 @@ struct HeatInterval {
   using Relaxation = std::array<physics::RelaxationGains<double>, kMaxRelaxationModes>;
 
   IntervalForcing forcing;
+  PartForcing parts;
   std::vector<physics::FosterLadder> ladders;  ///< gains of the model foster
   std::vector<Relaxation> relaxation;          ///< gains of the model emit2014
 };

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "history/part_history.hpp"
 #include "history/step_plan.hpp"
 #include "history/surface_history.hpp"
 #include "surface/heat/sample_heat.hpp"
@@ -26,8 +27,9 @@ struct RecordInputs {
   const SampleHeat& heat;                 ///< thermal model, which sizes and fills the gains
   const Environment& environment;         ///< sun and weather
   std::span<const PoseHistory> entities;  ///< poses of every entity
-  const IntervalRays& prototype;  ///< rays to copy for each interval, sized for the entities
-  glm::dvec3 origin_world_m;      ///< origin of rel
+  const IntervalRays& prototype;         ///< rays to copy for each interval, sized for the entities
+  glm::dvec3 origin_world_m;             ///< origin of rel
+  std::span<const PartHistory> parts{};  ///< drives of the parts of entities
 };
 
 /// Makes the record of all intervals of the plan. The first one begins where the history does, and

@@ -175,10 +175,10 @@ void CachedSurface::begin_first_interval(std::int64_t start_ns, const Inputs& in
   // Let all blocks follow the intervals.
   interval_.reset(*model_, anchors_, model_options().exchange,
                   static_cast<std::uint32_t>(plan.intervals().size()));
-  local_ =
-      LocalSteps(model_->samples,
-                 LocalSteps::Setup{grid_.start_ns(), grid_.interval_ns(), inputs.entities.size()},
-                 interval_.rays(), heat_.sized_interval());
+  local_ = LocalSteps(model_->samples,
+                      LocalSteps::Setup{grid_.start_ns(), grid_.interval_ns(),
+                                        inputs.entities.size(), inputs.parts},
+                      interval_.rays(), heat_.sized_interval());
   local_->restart(start_ns);
   // Compute node 1.
   begin_anew(0, inputs, history);
@@ -234,7 +234,7 @@ void CachedSurface::begin_interval(std::size_t node, const Inputs& inputs,
 void CachedSurface::begin_anew(std::size_t node, const Inputs& inputs,
                                SurfaceHistory& history) noexcept {
   const std::int64_t from_ns = nodes_[node].at_ns;
-  std::int64_t end_ns = grid_.next_ns(from_ns, from_ns, inputs.environment, inputs.entities);
+  std::int64_t end_ns = grid_.next_ns(from_ns, from_ns, inputs);
   // Answer a change of the weather with a short interval.
   if (std::ranges::binary_search(inputs.environment.changes_ns(), from_ns)) {
     end_ns = std::min(end_ns, from_ns + grid_.answer_ns());
@@ -278,7 +278,7 @@ void CachedSurface::begin_renewal(std::int64_t event_ns, std::int64_t now_ns, co
                                   SurfaceHistory& history) noexcept {
   if (event_ns < nodes_[0].at_ns + NodeGrid::kSameNs) event_ns = nodes_[0].at_ns;
   lags_ = weather_matters(nodes_[1], now_ns, inputs.environment, options_.tolerance_k);
-  std::int64_t end_ns = grid_.next_ns(event_ns, now_ns, inputs.environment, inputs.entities);
+  std::int64_t end_ns = grid_.next_ns(event_ns, now_ns, inputs);
   if (lags_) end_ns = std::min(end_ns, std::max(event_ns, now_ns) + grid_.answer_ns());
   // Move node 0 to the change, and begin the interval from there anew.
   local_->take_weather_change(event_ns, window(), model_->samples);
@@ -329,9 +329,9 @@ void CachedSurface::take_weather(std::int64_t now_ns, const Inputs& inputs,
 void CachedSurface::run_local(std::int64_t until_ns, const Inputs& inputs,
                               SurfaceHistory& history) noexcept {
   const SurfaceStep step = interval_.step(model_->samples);
-  local_->run(
-      until_ns, window(),
-      {inputs.environment, inputs.entities, history, step, workers_, geometry_.origin_world_m()});
+  local_->run(until_ns, window(),
+              {inputs.environment, inputs.entities, inputs.parts, history, step, workers_,
+               geometry_.origin_world_m()});
 }
 
 void CachedSurface::advance(std::int64_t now_ns, const Inputs& inputs,

@@ -25,6 +25,27 @@ double way_of(std::int64_t at_ns, const SurfaceNode& before, const SurfaceNode& 
          static_cast<double>(after.at_ns - before.at_ns);
 }
 
+/// Blocks that hold samples of a part.
+std::vector<std::uint32_t> blocks_of(const PartHistory& part, const SampleBlocks& blocks,
+                                     const SurfaceSamples& all) {
+  std::vector<std::uint32_t> out;
+  for (std::uint32_t b = 0; b < blocks.blocks().size(); ++b) {
+    if (blocks.blocks()[b].entity != static_cast<std::int32_t>(part.entity())) continue;
+    const auto is_of_part = [&](std::uint32_t i) {
+      return all.samples[i].material == part.material();
+    };
+    if (std::ranges::any_of(blocks.samples(b), is_of_part)) out.push_back(b);
+  }
+  return out;
+}
+
+/// Number of commands of all parts so far.
+std::uint64_t revision_of(std::span<const PartHistory> parts) noexcept {
+  std::uint64_t sum = 0;
+  for (const PartHistory& part : parts) sum += part.revision();
+  return sum;
+}
+
 /// Sets the vertices of a sample at both nodes so that the line between them passes through
 /// `offset_k` at `at_ns` and through `end` at `end_ns`.
 void draw_line(std::uint32_t sample, std::int64_t at_ns, float offset_k, std::int64_t end_ns,
@@ -61,6 +82,9 @@ LocalSteps::LocalSteps(const SurfaceSamples& all, const Setup& setup, const Inte
       known_found_(setup.entities, 0),
       own_clock_(all.samples.size(), 0) {
   rays_.take_short();
+  for (const PartHistory& part : setup.parts) {
+    part_blocks_.push_back(blocks_of(part, blocks_, all));
+  }
   for (auto& known : known_) known.resize(setup.entities);
   for (auto& entities : foreseen_) entities.resize(setup.entities);
   for (auto& turn : turns_) turn.reserve(state_.size() / kTurns + 1);
@@ -127,6 +151,19 @@ void LocalSteps::look_around(std::int64_t at_ns, const Window& window,
     }
     want(m, known_rays_, at_ns);
   }
+  // Find the parts whose heat changes now or within the step ahead.
+  for (std::size_t p = 0; p < part_blocks_.size(); ++p) {
+    if (!inputs.parts[p].changes(at_ns - step_ns_, at_ns + step_ns_)) continue;
+    for (const std::uint32_t b : part_blocks_[p]) want_block(b, at_ns);
+  }
+}
+
+void LocalSteps::want_block(std::uint32_t block, std::int64_t at_ns) noexcept {
+  // Mark the block as touched, and put it in its group unless it is there already.
+  touched_ns_[block] = at_ns;
+  if (state_[block] != State::of_interval) return;
+  state_[block] = State::wanted;
+  turns_[block % kTurns].push_back(block);
 }
 
 void LocalSteps::want(std::size_t entity, const IntervalRays& rays, std::int64_t at_ns) noexcept {
@@ -136,11 +173,7 @@ void LocalSteps::want(std::size_t entity, const IntervalRays& rays, std::int64_t
         !rays.touches(entity, block.centre_m, block.radius_m, block.entity)) {
       continue;
     }
-    // Mark the block as touched, and put it in its group unless it is there already.
-    touched_ns_[b] = at_ns;
-    if (state_[b] != State::of_interval) continue;
-    state_[b] = State::wanted;
-    turns_[b % kTurns].push_back(b);
+    want_block(b, at_ns);
   }
 }
 
@@ -213,6 +246,7 @@ void LocalSteps::prepare(std::int64_t begin_ns, std::int64_t end_ns, const Windo
   inputs.history.restore_surroundings(between(window.before.surroundings, window.after.surroundings,
                                               way_of(begin_ns, window.before, window.after)));
   interval_.forcing = inputs.history.extend(begin_ns, end_ns, inputs.environment);
+  interval_.parts.update(inputs.parts, begin_ns, end_ns);
   inputs.step.heat.prepare(interval_);
   rays_.update(begin_ns, end_ns, static_cast<std::uint32_t>(end_ns / step_ns_), inputs.environment,
                EntityPoses::ahead(inputs.entities), inputs.origin_world_m);
@@ -305,10 +339,12 @@ void LocalSteps::show(std::span<const std::uint32_t> blocks, std::size_t turn, s
   for (std::size_t m = 0; m < foreseen_[turn].size(); ++m) {
     foreseen_[turn][m] = inputs.entities[m].ahead(end_ns);
   }
+  foreseen_parts_[turn] = revision_of(inputs.parts);
 }
 
 bool LocalSteps::came_true(std::size_t turn, std::int64_t at_ns,
                            const Inputs& inputs) const noexcept {
+  if (foreseen_parts_[turn] != revision_of(inputs.parts)) return false;
   for (std::size_t m = 0; m < foreseen_[turn].size(); ++m) {
     const TrajectoryState now = inputs.entities[m].at(at_ns);
     const TrajectoryState& then = foreseen_[turn][m];

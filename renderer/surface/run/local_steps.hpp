@@ -19,7 +19,8 @@
 
 namespace emit::renderer {
 
-/// Short time steps of the samples near entities that the host drives.
+/// Short time steps of the samples near entities that the host drives, and of parts whose heat
+/// changes.
 ///
 /// The rays of an interval are sent before it begins, with the poses known then. If an entity
 /// departs from these poses, three sets of samples leave the interval in blocks: its own, those
@@ -27,7 +28,9 @@ namespace emit::renderer {
 /// block over the time that has passed, with the poses that came. It then advances the block one
 /// step ahead with foreseen poses, for the frames to show. If poses came as foreseen, the step
 /// ahead counts and is not done again. A block returns to the interval, over the rest of it, when
-/// no such entity is near any more. Blocks take turns, so that no frame advances all of them.
+/// no such entity is near any more. Samples of a part are on their own too while a command begins
+/// to act or the temperature behind their skin moves. Blocks take turns, so that no frame advances
+/// all of them.
 ///
 /// Node `before` holds the states of a block on its own at the end of its latest step, and `after`
 /// holds the states foreseen at the end of the next step. The vertices of both nodes lie on
@@ -42,11 +45,13 @@ class LocalSteps {
     std::int64_t start_ns = 0;  ///< a node of the grid on which steps begin
     std::int64_t interval_ns = 1;
     std::size_t entities = 0;
+    std::span<const PartHistory> parts{};
   };
   /// Data that the steps work with.
   struct Inputs {
     const Environment& environment;
     std::span<const PoseHistory> entities;
+    std::span<const PartHistory> parts;
     SurfaceHistory& history;  ///< surroundings; left in the state that `next` ends with
     const SurfaceStep& step;
     threads::WorkerPool& workers;
@@ -117,13 +122,16 @@ class LocalSteps {
                    const SurfaceSamples& all) noexcept;
   /// Marks the blocks that an entity touches in the time of `rays`, and its own blocks.
   void want(std::size_t entity, const IntervalRays& rays, std::int64_t at_ns) noexcept;
+  /// Marks a block as touched.
+  void want_block(std::uint32_t block, std::int64_t at_ns) noexcept;
   /// Advances blocks to `to_ns` with the poses that came.
   void bring(std::span<const std::uint32_t> blocks, std::int64_t to_ns, const Window& window,
              const Inputs& inputs) noexcept;
   /// Advances blocks one step ahead with foreseen poses, and draws their vertices on that line.
   void show(std::span<const std::uint32_t> blocks, std::size_t turn, std::int64_t at_ns,
             const Window& window, const Inputs& inputs) noexcept;
-  /// Returns true if all entities stand at `at_ns` where they were foreseen to be.
+  /// Returns true if all entities stand at `at_ns` where they were foreseen to be, and no part has
+  /// a new command.
   [[nodiscard]] bool came_true(std::size_t turn, std::int64_t at_ns,
                                const Inputs& inputs) const noexcept;
   /// Advances blocks to the end of the interval, and from there to `next` as far as it is computed.
@@ -158,6 +166,8 @@ class LocalSteps {
   std::vector<std::int64_t> foreseen_ns_;  ///< by block: end of its step ahead, which `after` holds
   /// Foreseen states of the entities at the end of the step ahead, by turn, then entity.
   std::array<std::vector<TrajectoryState>, kTurns> foreseen_;
+  std::array<std::uint64_t, kTurns> foreseen_parts_{};   ///< by turn: commands that were known then
+  std::vector<std::vector<std::uint32_t>> part_blocks_;  ///< by part: blocks with samples of it
   /// Flag of each entity: 1 once the blocks that it was to shade in this interval are found.
   std::vector<std::uint8_t> known_found_;
   std::vector<std::uint8_t> own_clock_;                   ///< by sample: has_own_clock()

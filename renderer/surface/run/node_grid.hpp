@@ -4,8 +4,7 @@
 #include <span>
 
 #include "emit/physics/check.hpp"
-#include "history/environment.hpp"
-#include "history/pose_history.hpp"
+#include "surface/run/world_inputs.hpp"
 
 namespace emit::renderer {
 
@@ -33,10 +32,9 @@ class NodeGrid {
   /// Returns the instant of the grid at or before `now_ns`; the first one if there is none.
   [[nodiscard]] std::int64_t at_or_before_ns(std::int64_t now_ns) const noexcept;
   /// Returns the time of the node after one at `from_ns`: the next instant of the grid, or an
-  /// earlier one after `now_ns` at which an entity or the weather changes.
+  /// earlier one after `now_ns` at which an entity, the weather or a part that was at rest changes.
   [[nodiscard]] std::int64_t next_ns(std::int64_t from_ns, std::int64_t now_ns,
-                                     const Environment& environment,
-                                     std::span<const PoseHistory> entities) const noexcept;
+                                     const WorldInputs& inputs) const noexcept;
 
  private:
   std::int64_t start_ns_;

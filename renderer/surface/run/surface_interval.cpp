@@ -45,6 +45,7 @@ void SurfaceInterval::begin(const SurfaceNode& from, SurfaceNode& to, const Surf
   // Fill the forcing, which also advances the surroundings to the end of the interval.
   history.restore_surroundings(from.surroundings);
   interval_.forcing = history.extend(from.at_ns, to.at_ns, inputs.environment);
+  interval_.parts.update(inputs.parts, from.at_ns, to.at_ns);
   to.forcing = interval_.forcing;
   to.surroundings = history.surroundings();
   to.surroundings_k = history.surroundings_now_k();

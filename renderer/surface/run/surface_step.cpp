@@ -43,12 +43,14 @@ class ViewedSample {
 
 /// Input of a sample over an interval. Other samples count with their output at its begin.
 SampleDrive drive_of(const SurfaceStep& step, const IntervalRays& interval_rays,
-                     std::span<const SampleOutput> begin, const ViewedSample& viewed,
-                     const RayOffsets& offsets, const SunShare& sun) noexcept {
+                     const PartForcing& parts, std::span<const SampleOutput> begin,
+                     const ViewedSample& viewed, const RayOffsets& offsets,
+                     const SunShare& sun) noexcept {
   const SurfaceSample& sample = viewed.sample();
   const ViewOfNow& view = viewed.view();
   SampleDrive drive;
   drive.sun_frac = sun.frac;
+  drive.take_part(parts, sample);
   // Replace the sky behind entities by the long-wave radiation of the one that hides most.
   const HiddenSky hidden = interval_rays.hidden_sky(step.rays, sample, offsets.around_m);
   drive.hidden_sky_frac = hidden.frac;
@@ -102,7 +104,8 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
     return interval_rays.sun_share(step.rays, side, offsets.sun_m, 0.0F);
   };
   const SunShare sun = sun_of(sample);
-  const SampleDrive drive = drive_of(step, interval_rays, begin, viewed, offsets, sun);
+  const SampleDrive drive =
+      drive_of(step, interval_rays, interval.parts, begin, viewed, offsets, sun);
   const glm::vec3 normal = interval_rays.normal(sample);
   if (sample.other_side == kNoSample) {
     stepped.output = step.heat.advance(sample, normal, interval, drive, stepped.state);
@@ -115,7 +118,7 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
   const SurfaceSample& behind = viewed_behind.sample();
   const SunShare sun_behind = sun_of(behind);
   const SampleDrive back_drive =
-      drive_of(step, interval_rays, begin, viewed_behind, offsets, sun_behind);
+      drive_of(step, interval_rays, interval.parts, begin, viewed_behind, offsets, sun_behind);
   const SheetBack back{behind, back_drive};
   stepped.output = step.heat.advance(sample, normal, interval, drive, stepped.state, &back);
   stepped.behind =

@@ -34,11 +34,12 @@ std::vector<std::vector<glm::vec3>> SurfaceWarmUp::ways_m() const {
 physics::Result<SurfaceModel> SurfaceWarmUp::build() const {
   const SurfaceGeometry& geometry = in_.geometry;
   // Make the record of the past.
-  in_.plan.update(in_.start_ns, in_.world.environment, in_.world.entities);
+  in_.plan.update(in_.start_ns, in_.world.environment, in_.world.entities, in_.world.parts);
   in_.history.update(in_.plan, in_.world.environment);
-  const HistoryRecord record = make_history_record(
-      in_.plan, in_.history,
-      {in_.heat, in_.world.environment, in_.world.entities, in_.rays, geometry.origin_world_m()});
+  const HistoryRecord record =
+      make_history_record(in_.plan, in_.history,
+                          {in_.heat, in_.world.environment, in_.world.entities, in_.rays,
+                           geometry.origin_world_m(), in_.world.parts});
   // Place samples and integrate their past.
   const std::vector<std::vector<glm::vec3>> ways_m = this->ways_m();
   const SurfaceInputs inputs{geometry.geometry(),
@@ -62,7 +63,7 @@ physics::Result<SurfaceModel> SurfaceWarmUp::build() const {
 StateKey SurfaceWarmUp::key_of(const SavedSurface& saved, std::int64_t at_ns) const {
   StateKey key = saved.key;
   key[static_cast<std::size_t>(StatePart::live)] =
-      live_hash(at_ns, in_.world.environment, in_.world.entities);
+      live_hash(at_ns, in_.world.environment, in_.world.entities, in_.world.parts);
   return key;
 }
 

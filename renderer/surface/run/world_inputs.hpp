@@ -3,15 +3,17 @@
 #include <span>
 
 #include "history/environment.hpp"
+#include "history/part_history.hpp"
 #include "history/pose_history.hpp"
 
 namespace emit::renderer {
 
-/// Sun, weather and poses of the entities, which a surface follows. Both must outlive the call that
-/// gets them.
+/// Sun, weather, poses of the entities and drives of their parts, which a surface follows. All must
+/// outlive the call that gets them.
 struct WorldInputs {
   const Environment& environment;
   std::span<const PoseHistory> entities;
+  std::span<const PartHistory> parts{};  ///< ascending by entity
 };
 
 }  // namespace emit::renderer

@@ -12,6 +12,7 @@
 #include "emit/scene/mesh.hpp"
 #include "emit/scene/scene_desc.hpp"
 #include "history/environment.hpp"
+#include "history/part_history.hpp"
 #include "history/pose_history.hpp"
 #include "surface/model/surface_model.hpp"
 
@@ -55,7 +56,8 @@ using StateKey = std::array<std::uint64_t, kStateParts>;
                                     const scene::SceneGeometry& geometry);
 /// Hashes StatePart::live: what the host has sent for instants up to `at_ns`.
 [[nodiscard]] std::uint64_t live_hash(std::int64_t at_ns, const Environment& environment,
-                                      std::span<const PoseHistory> entities);
+                                      std::span<const PoseHistory> entities,
+                                      std::span<const PartHistory> parts);
 
 /// Requirements of a run on a state.
 struct StateWanted {

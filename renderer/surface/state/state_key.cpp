@@ -56,6 +56,13 @@ std::uint64_t scene_hash(const scene::ScenarioDesc& scenario,
   for (const scene::ObjectDesc& object : scenario.objects) {
     add(hash, object.entity_id, object.on);
     add_keys(hash, object.trajectory);
+    for (const scene::PartDesc& part : object.parts) {
+      add(hash, part.id, part.material, part.curve.given, part.curve.idle_k, part.curve.full_k,
+          part.curve.cold_k, part.curve.up_s, part.curve.down_s);
+      for (const scene::TimedPartCommand& key : part.commands) {
+        add(hash, key.sim_time_ns, key.command.kind, key.command.value);
+      }
+    }
   }
   return hash.value();
 }
@@ -165,7 +172,7 @@ StateKey scenario_key(const scene::ScenarioDesc& scenario, const scene::SceneGeo
 }
 
 std::uint64_t live_hash(std::int64_t at_ns, const Environment& environment,
-                        std::span<const PoseHistory> entities) {
+                        std::span<const PoseHistory> entities, std::span<const PartHistory> parts) {
   Fnv64 hash;
   for (const PoseHistory& entity : entities) {
     // Add the poses that the host has sent for instants up to `at_ns`.
@@ -176,6 +183,13 @@ std::uint64_t live_hash(std::int64_t at_ns, const Environment& environment,
   // Add the weather that it has sent, likewise.
   for (const physics::WeatherSample& row : environment.live()) {
     if (row.sim_time_ns <= at_ns) add_weather(hash, row);
+  }
+  // Add its commands to parts.
+  for (const PartHistory& part : parts) {
+    for (const PartHistory::Step& step : part.live()) {
+      if (step.from_ns > at_ns) break;
+      add(hash, part.id(), part.entity(), step.from_ns, step.command.kind, step.command.value);
+    }
   }
   return hash.value();
 }

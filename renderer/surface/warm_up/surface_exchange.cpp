@@ -186,6 +186,7 @@ SampleDrive Sweeper::drive(std::size_t s, const glm::vec3& normal, std::size_t j
   SampleDrive drive;
   const SampleHistories::Rows& rows = histories_.rows[s];
   drive.sun_frac = rows.sun_frac[j];
+  drive.take_part(in_.record.intervals[j].parts, sample);
   if (!rows.hidden_sky.empty()) drive.hidden_sky_frac = rows.hidden_sky[j].frac;
   // Add what the seen samples send, scaled to the share of the hemisphere that they fill.
   if (const std::span<const double> received_w_m2 = seen_.of(sample); !received_w_m2.empty()) {

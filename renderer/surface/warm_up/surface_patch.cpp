@@ -290,9 +290,10 @@ void PatchSampler::integrate(std::span<const NewSample> samples, StartMemo& memo
     sample.far_frac = 1.0F - sample.sky_frac;
     return sample;
   };
-  const auto drive_of = [](const SurfacePatch& side, std::uint32_t index, std::size_t i) {
+  const auto drive_of = [&record](const SurfacePatch& side, std::uint32_t index, std::size_t i) {
     SampleDrive drive;
     drive.sun_frac = side.sun_frac.row(index)[i];
+    drive.take_part(record.intervals[i].parts, side.samples[index]);
     if (side.hidden_sky.length() != 0) drive.hidden_sky_frac = side.hidden_sky.row(index)[i].frac;
     return drive;
   };

@@ -52,6 +52,7 @@ scene::ScenarioDesc saved_scenario(const std::filesystem::path& state_file) {
   spot.position_world_m += glm::dvec3(3.0, -2.0, 0.0);
   physics::Pose away = spot;
   away.position_world_m.x += 200.0;
+  vehicle.parts = {{1, "hull", s.materials[0].name, {}, {}}};
   vehicle.trajectory = {{0, spot, true, false},
                         {2 * kHourNs + 5 * kSecondNs, spot, true, false},
                         {2 * kHourNs + 6 * kSecondNs, away, true, true}};
@@ -178,6 +179,10 @@ TEST(RendererStateFile, OneThatDoesNotFitIsRefusedWithTheReasonAndKept) {
       {"scene geometry", [](auto& s) { s.objects[0].scale = 1.01; }},
       {"scene geometry",
        [](auto& s) { s.objects[1].trajectory[0].pose.position_world_m.x += 0.1; }},
+      {"scene geometry",
+       [](auto& s) {
+         s.objects[1].parts[0].commands = {{0, {scene::PartCommand::Kind::power, 100.0}}};
+       }},
       {"materials", [](auto& s) { s.materials[0].solar_absorptance_frac -= 0.01; }},
       {"materials", [](auto& s) { s.materials[0].layers[1].conductivity_w_m_k += 0.1; }},
       {"place or date", [](auto& s) { s.place.lat_rad += 1e-6; }},
@@ -223,6 +228,10 @@ TEST(RendererStateFile, OneThatDoesNotFitIsRefusedWithTheReasonAndKept) {
   refused("input of the host", [&](Session& run, renderer::FrameRequest&) {
     const renderer::EntityUpdate update{7, scenario.objects[1].instances[0], true, false};
     EXPECT_EQ(run.renderer().apply_entities(kHourNs, {&update, 1}), 1U);
+  });
+  refused("input of the host", [&](Session& run, renderer::FrameRequest&) {
+    EXPECT_TRUE(
+        run.renderer().apply_part(kHourNs, {7, 1, {scene::PartCommand::Kind::temperature, 330.0}}));
   });
   EXPECT_EQ(std::filesystem::last_write_time(file), written);
   EXPECT_TRUE(Session(scenario).warm_up().result);  // the file is still valid

@@ -63,6 +63,13 @@ struct EntityUpdate {
   bool teleport = false;  ///< jump: there is no motion between the previous pose and this one
 };
 
+/// Drive of a part of an entity from the instant of a host on.
+struct PartUpdate {
+  std::uint32_t entity_id = 0;
+  std::uint32_t part_id = 0;  ///< scene::PartDesc::id
+  scene::PartCommand command;
+};
+
 /// Request for one frame.
 struct FrameRequest {
   std::uint64_t frame_number = 0;
@@ -184,13 +191,18 @@ class Renderer {
   virtual std::size_t apply_entities(std::int64_t sim_time_ns,
                                      std::span<const EntityUpdate> updates) noexcept = 0;
 
+  /// Drives a part of an entity from `sim_time_ns` on. The first command of a run replaces those of
+  /// the scenario from there on. Returns false, and changes nothing, when no such part is in the
+  /// scene or the time is before that of the part's newest command. RT-safe.
+  virtual bool apply_part(std::int64_t sim_time_ns, const PartUpdate& update) noexcept = 0;
+
   /// Sets the weather from `sample.sim_time_ns` on, in place of the scenario's weather. Returns
   /// false when the store is full. RT-safe.
   virtual bool apply_weather(const scene::WeatherSample& sample) noexcept = 0;
 
-  /// Forgets all poses and weather from the host. With thermal.method = "cached" the samples of the
-  /// surface stay, so that frames of a later run may differ in the last bits from those of a new
-  /// renderer. RT-safe.
+  /// Forgets all poses, commands to parts and weather from the host. With thermal.method = "cached"
+  /// the samples of the surface stay, so that frames of a later run may differ in the last bits
+  /// from those of a new renderer. RT-safe.
   virtual void reset() noexcept = 0;
 
   /// Does the work that frames from `first` on need once. With thermal.method = "cached" it samples

@@ -37,6 +37,12 @@ inline constexpr Interval kCloudFrac{0.0, 1.0};
 inline constexpr Interval kEnvironmentK{100.0, 400.0};
 inline constexpr Interval kFilmWM2K{0.0, 1000.0};
 
+// Parts of entities that heat themselves, of scenarios and of host frames.
+inline constexpr Interval kPartK{50.0, 3000.0};
+inline constexpr Interval kPartPowerWM2{0.0, 1e6};
+inline constexpr Interval kPartThrottle{0.0, 1.0};
+inline constexpr Count kPartId{1, 65535};
+
 // Poses.
 inline constexpr Interval kQuaternionNorm{0.99, 1.01};
 /// Largest absolute coordinate of a position, m.

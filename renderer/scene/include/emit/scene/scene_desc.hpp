@@ -105,6 +105,40 @@ struct Keyframe {
 /// after it.
 using Trajectory = std::vector<Keyframe>;
 
+/// Drive of a part of a body from an instant on.
+struct PartCommand {
+  enum class Kind : std::uint8_t {
+    off,          ///< nothing; a part with a curve cools towards its cold temperature
+    temperature,  ///< value: temperature of the skin, K
+    power,        ///< value: power into the skin, W/m2
+    throttle,     ///< value: 0 (idle) to 1 (full), with the curve of the part
+  };
+  Kind kind = Kind::off;
+  double value = 0.0;
+  bool operator==(const PartCommand&) const = default;
+};
+struct TimedPartCommand {
+  std::int64_t sim_time_ns = 0;
+  PartCommand command;
+};
+/// Temperatures behind the skin of a part, and the time constants with which it goes between them.
+struct PartCurve {
+  bool given = false;  ///< false: the part takes no throttle
+  double idle_k = 0.0;
+  double full_k = 0.0;
+  double cold_k = 288.15;  ///< switched off
+  double up_s = 0.0;       ///< time constant towards a higher temperature; 0: at once
+  double down_s = 0.0;
+};
+/// A part of an entity that heats itself: all surfaces of the object with one material.
+struct PartDesc {
+  std::uint32_t id = 1;  ///< unique in the object; hosts name the part by it
+  std::string name;
+  std::string material;  ///< library material
+  PartCurve curve;
+  std::vector<TimedPartCommand> commands;  ///< ascending in time; off before the first
+};
+
 /// A glTF file placed in the world, once or many times.
 struct ObjectDesc {
   std::string name;
@@ -123,6 +157,7 @@ struct ObjectDesc {
   glm::dvec3 model_offset_m{0.0};  ///< of the model's origin in the body: forward, right, down
   Trajectory trajectory;  ///< entities only; empty: stays at its placement until the host moves it
   bool on = true;         ///< entities only: on state without a trajectory
+  std::vector<PartDesc> parts;  ///< entities only: what heats itself
 };
 
 /// Joint between two bodies that touch. Bodies that no contact names conduct to each other as if

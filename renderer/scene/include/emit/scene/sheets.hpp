@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <optional>
+#include <string>
 
 #include "emit/scene/mesh.hpp"
 
@@ -22,6 +23,11 @@ inline constexpr double kMaxGasKgM3 = 10.0;
 /// conductance to the core, which stands for convection in that model, is the material's own or
 /// that of the air behind.
 [[nodiscard]] std::optional<Material> sheet_of(const Material& material);
+
+/// Name of the sheet of a material.
+[[nodiscard]] inline std::string sheet_name(const std::string& material) {
+  return material + " (sheet)";
+}
 
 /// True where the mesh has double-sided faces and is not the surface of a closed body.
 [[nodiscard]] bool may_have_sheets(const Mesh& mesh);
