@@ -15,7 +15,7 @@ namespace emit::protocol {
 namespace {
 
 // Length of the arena, bytes. It holds the largest parsed host frame: 128 entities of about 270
-// bytes each.
+// bytes each, and 32 parts.
 constexpr std::size_t kArenaBytes = std::size_t{128} << 10;
 
 /// Arena with memory of its own, to which it returns after every message, so that it does not
@@ -56,6 +56,7 @@ bool read_varint(std::span<const std::byte> bytes, std::size_t& at, std::uint64_
 struct Outline {
   std::uint64_t protocol_version = 0;
   std::uint64_t entities = 0;
+  std::uint64_t parts = 0;
 };
 
 /// Reads the top-level fields before Protobuf parses the message. The version is then known even
@@ -92,6 +93,7 @@ bool read_outline(std::span<const std::byte> bytes, Outline& outline, HostFrameD
         if (!read_varint(bytes, at, value) || value > bytes.size() - at) return false;
         at += static_cast<std::size_t>(value);
         if (field == v1::HostFrame::kEntitiesFieldNumber) ++outline.entities;
+        if (field == v1::HostFrame::kPartsFieldNumber) ++outline.parts;
         break;
       case kFixed32:
         if (left < 4) return false;
@@ -106,7 +108,7 @@ bool read_outline(std::span<const std::byte> bytes, Outline& outline, HostFrameD
 
 DecodeFault out_of_range(DecodeFault::Part part, const char* field, double value, double lowest,
                          double highest) noexcept {
-  return {DecodeFault::Kind::out_of_range, part, 0, field, value, lowest, highest};
+  return {DecodeFault::Kind::out_of_range, part, 0, field, value, lowest, highest, 0};
 }
 
 }  // namespace
@@ -138,6 +140,8 @@ std::string_view to_string(DecodeStatus status) noexcept {
       return "invalid environment";
     case DecodeStatus::invalid_view:
       return "invalid view";
+    case DecodeStatus::invalid_part:
+      return "invalid part";
   }
   return "unknown";
 }
@@ -176,6 +180,12 @@ DecodeStatus decode_host_frame(std::span<const std::byte> bytes, HostFrameDecode
     fault = out_of_range(DecodeFault::Part::message, "number of entities",
                          static_cast<double>(outline.entities), 0.0,
                          static_cast<double>(kMaxEntitiesPerFrame));
+    return DecodeStatus::oversize;
+  }
+  if (outline.parts > kMaxPartsPerFrame) {
+    fault = out_of_range(DecodeFault::Part::message, "number of parts",
+                         static_cast<double>(outline.parts), 0.0,
+                         static_cast<double>(kMaxPartsPerFrame));
     return DecodeStatus::oversize;
   }
   v1::HostFrame* message = decoder.impl_->arena.fresh_host_frame();

@@ -20,6 +20,9 @@ void add_place(DecodeStatus status, const DecodeFault& fault, FixedText& out) no
     case DecodeFault::Part::entity:
       out.add(": entity {}", fault.entity_id);
       break;
+    case DecodeFault::Part::part:
+      out.add(": entity {}, part {}", fault.entity_id, fault.part_id);
+      break;
   }
   if (fault.kind == DecodeFault::Kind::repeated) {
     out.add(" stands in the frame twice");
@@ -64,13 +67,20 @@ std::string status_text(StatusCode code, std::uint64_t detail) {
                  ? "step needs a pose, and hold or stop before it"
                  : "not allowed now";
     case StatusCode::overloaded:
-      return fmt::format("entity {}: more entities than emitd tracks", detail);
+      return fmt::format("entity {}: more entities or commands to parts than emitd takes", detail);
     case StatusCode::internal:
       return "failure inside emitd";
     case StatusCode::invalid_environment:
       return "environment outside its ranges";
     case StatusCode::invalid_view:
       return "field of view outside sensor.fov_h_min_deg to sensor.fov_h_deg, or fixed by optics";
+    case StatusCode::invalid_part:
+      return "drive of a part outside its range";
+    case StatusCode::unknown_part:
+      return fmt::format(
+          "entity {}, part {}: the scenario has no such part, or it takes no throttle; the rest of "
+          "the frame is taken",
+          detail >> 32U, detail & 0xFFFFFFFFU);
   }
   return "unknown status";
 }

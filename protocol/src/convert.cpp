@@ -24,6 +24,7 @@ static_assert(static_cast<int>(DecodeStatus::invalid_pose) == v1::Status::CODE_I
 static_assert(static_cast<int>(DecodeStatus::invalid_environment) ==
               v1::Status::CODE_INVALID_ENVIRONMENT);
 static_assert(static_cast<int>(DecodeStatus::invalid_view) == v1::Status::CODE_INVALID_VIEW);
+static_assert(static_cast<int>(DecodeStatus::invalid_part) == v1::Status::CODE_INVALID_PART);
 
 namespace limits = physics::limits;
 
@@ -50,7 +51,7 @@ class RangeCheck {
   bool in_range(const char* field, double value, const limits::Interval& range) noexcept {
     if (range.contains(value)) return true;
     note({DecodeFault::Kind::out_of_range, DecodeFault::Part::message, 0, field, value, range.lo,
-          range.hi});
+          range.hi, 0});
     return false;
   }
   /// `fields`: the names of the three components.
@@ -62,7 +63,7 @@ class RangeCheck {
   }
   bool present(const char* field, bool is_there) noexcept {
     if (!is_there) {
-      note({DecodeFault::Kind::missing, DecodeFault::Part::message, 0, field, 0.0, 0.0, 0.0});
+      note({DecodeFault::Kind::missing, DecodeFault::Part::message, 0, field, 0.0, 0.0, 0.0, 0});
     }
     return is_there;
   }
@@ -75,10 +76,12 @@ class RangeCheck {
 };
 
 /// Says whose pose or weather the noted field belongs to.
-void set_part(DecodeFault* fault, DecodeFault::Part part, std::uint32_t entity_id = 0) noexcept {
+void set_part(DecodeFault* fault, DecodeFault::Part part, std::uint32_t entity_id = 0,
+              std::uint32_t part_id = 0) noexcept {
   if (fault != nullptr) {
     fault->part = part;
     fault->entity_id = entity_id;
+    fault->part_id = part_id;
   }
 }
 
@@ -100,6 +103,34 @@ bool repeats_an_id(const HostFrameData& frame, std::uint32_t checked) noexcept {
     if (frame.entities[i].entity_id == frame.entities[checked].entity_id) return true;
   }
   return false;
+}
+
+/// Returns true when a command before command `checked` is for the same part.
+bool repeats_a_part(const HostFrameData& frame, std::uint32_t checked) noexcept {
+  const PartCommandData& part = frame.parts[checked];
+  for (std::uint32_t i = 0; i < checked; ++i) {
+    if (frame.parts[i].entity_id == part.entity_id && frame.parts[i].part_id == part.part_id) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// Reads the commands to parts of a host frame.
+DecodeStatus read_parts(const v1::HostFrame& in, HostFrameData& out, DecodeFault* fault) noexcept {
+  for (const v1::PartCommand& part : in.parts()) {
+    const std::uint32_t index = out.part_count;
+    if (auto status = from_proto(part, out.parts[index], fault); status != DecodeStatus::ok) {
+      return status;
+    }
+    if (repeats_a_part(out, index)) {
+      if (fault != nullptr) fault->kind = DecodeFault::Kind::repeated;
+      set_part(fault, DecodeFault::Part::part, part.entity_id(), part.part_id());
+      return DecodeStatus::invalid_part;
+    }
+    ++out.part_count;
+  }
+  return DecodeStatus::ok;
 }
 
 }  // namespace
@@ -144,6 +175,25 @@ void to_proto(const EnvironmentData& environment, v1::Environment& out) {
   if (environment.film_w_m2_k) out.set_film_w_m2_k(*environment.film_w_m2_k);
 }
 
+void to_proto(const PartCommandData& part, v1::PartCommand& out) {
+  out.set_entity_id(part.entity_id);
+  out.set_part_id(part.part_id);
+  switch (part.kind) {
+    case PartCommandData::Kind::off:
+      out.clear_drive();
+      break;
+    case PartCommandData::Kind::temperature:
+      out.set_temperature_k(part.value);
+      break;
+    case PartCommandData::Kind::power:
+      out.set_power_w_m2(part.value);
+      break;
+    case PartCommandData::Kind::throttle:
+      out.set_throttle(part.value);
+      break;
+  }
+}
+
 void to_proto(const HostFrameData& frame, v1::HostFrame& out) {
   out.Clear();
   out.set_protocol_version(kProtocolVersion);
@@ -159,6 +209,7 @@ void to_proto(const HostFrameData& frame, v1::HostFrame& out) {
     out.mutable_gimbal()->set_pitch_rad(frame.gimbal_rad->y);
     out.mutable_gimbal()->set_roll_rad(frame.gimbal_rad->z);
   }
+  for (const PartCommandData& part : frame.part_span()) to_proto(part, *out.add_parts());
 }
 
 DecodeStatus check_pose(const physics::Pose& pose, const std::optional<PoseRates>& rates,
@@ -248,6 +299,44 @@ DecodeStatus from_proto(const v1::Environment& in, EnvironmentData& out,
   return check_environment(out, fault);
 }
 
+DecodeStatus check_part(const PartCommandData& part, DecodeFault* fault) noexcept {
+  using Kind = PartCommandData::Kind;
+  RangeCheck check(fault);
+  const bool valid = check.in_range("part_id", static_cast<double>(part.part_id),
+                                    {limits::kPartId.lo, limits::kPartId.hi}) &&
+                     (part.kind != Kind::temperature ||
+                      check.in_range("temperature_k", part.value, limits::kPartK)) &&
+                     (part.kind != Kind::power ||
+                      check.in_range("power_w_m2", part.value, limits::kPartPowerWM2)) &&
+                     (part.kind != Kind::throttle ||
+                      check.in_range("throttle", part.value, limits::kPartThrottle));
+  if (valid) return DecodeStatus::ok;
+  set_part(fault, DecodeFault::Part::part, part.entity_id, part.part_id);
+  return DecodeStatus::invalid_part;
+}
+
+DecodeStatus from_proto(const v1::PartCommand& in, PartCommandData& out,
+                        DecodeFault* fault) noexcept {
+  out = PartCommandData{in.entity_id(), in.part_id()};
+  switch (in.drive_case()) {
+    case v1::PartCommand::kTemperatureK:
+      out.kind = PartCommandData::Kind::temperature;
+      out.value = in.temperature_k();
+      break;
+    case v1::PartCommand::kPowerWM2:
+      out.kind = PartCommandData::Kind::power;
+      out.value = in.power_w_m2();
+      break;
+    case v1::PartCommand::kThrottle:
+      out.kind = PartCommandData::Kind::throttle;
+      out.value = in.throttle();
+      break;
+    case v1::PartCommand::DRIVE_NOT_SET:
+      break;
+  }
+  return check_part(out, fault);
+}
+
 DecodeStatus from_proto(const v1::HostFrame& in, HostFrameData& out, DecodeFault* fault) noexcept {
   out.frame_number = in.frame_number();
   out.sim_time_ns = in.sim_time_ns();
@@ -257,8 +346,10 @@ DecodeStatus from_proto(const v1::HostFrame& in, HostFrameData& out, DecodeFault
   out.environment.reset();
   out.fov_h_rad.reset();
   out.gimbal_rad.reset();
+  out.part_count = 0;
   if (in.protocol_version() != kProtocolVersion) return DecodeStatus::wrong_version;
-  if (static_cast<std::size_t>(in.entities_size()) > kMaxEntitiesPerFrame) {
+  if (static_cast<std::size_t>(in.entities_size()) > kMaxEntitiesPerFrame ||
+      static_cast<std::size_t>(in.parts_size()) > kMaxPartsPerFrame) {
     return DecodeStatus::oversize;
   }
   RangeCheck check(fault);
@@ -302,6 +393,7 @@ DecodeStatus from_proto(const v1::HostFrame& in, HostFrameData& out, DecodeFault
                                        limits::kFieldOfViewDeg.hi * physics::kDegree};
     if (!check.in_range("fov_h_rad", *out.fov_h_rad, kFovRad)) return DecodeStatus::invalid_view;
   }
+  if (auto status = read_parts(in, out, fault); status != DecodeStatus::ok) return status;
   if (in.has_environment()) {
     return from_proto(in.environment(), out.environment.emplace(), fault);
   }

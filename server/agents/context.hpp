@@ -176,6 +176,10 @@ struct Context {
       return Counter::refused_invalid_environment;
     case StatusCode::invalid_view:
       return Counter::refused_invalid_view;
+    case StatusCode::invalid_part:
+      return Counter::refused_invalid_part;
+    case StatusCode::unknown_part:
+      return Counter::refused_unknown_part;
     case StatusCode::ok:
     case StatusCode::internal:
       break;

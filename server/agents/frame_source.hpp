@@ -46,6 +46,11 @@ class FrameSource {
 
   virtual std::size_t apply_entities(std::int64_t sim_time_ns,
                                      std::span<const renderer::EntityUpdate> updates) noexcept = 0;
+  /// Drives a part; see Renderer::apply_part(). Sources of stored images ignore it.
+  virtual bool apply_part(std::int64_t /*sim_time_ns*/,
+                          const renderer::PartUpdate& /*update*/) noexcept {
+    return true;
+  }
   virtual bool apply_weather(const scene::WeatherSample& sample) noexcept = 0;
   virtual void reset() noexcept = 0;
 

@@ -11,8 +11,8 @@
 #include "agents/messages.hpp"
 #include "rt/byte_ring.hpp"
 
-/// Journal lines on the way from conductor to recorder. A line is a head, then the entities it
-/// counts, both copied byte by byte. The recorder turns them into emit.v1.JournalEntry.
+/// Journal lines on the way from conductor to recorder. A line is a head, then the elements it
+/// counts, all copied byte by byte. The recorder turns them into emit.v1.JournalEntry.
 namespace emit::server {
 
 enum class JournalKind : std::uint32_t { run_start, host_frame, command, frame };
@@ -33,7 +33,8 @@ struct JournalCommand {
   CommandKind command = CommandKind::start;
 };
 
-/// Head of a line with a host frame. entity_count EntityStateData follow.
+/// Head of a line with a host frame. entity_count EntityStateData follow, then part_count
+/// PartCommandData.
 struct JournalHostFrame {
   JournalHead head;
   std::uint64_t frame_number = 0;
@@ -46,6 +47,7 @@ struct JournalHostFrame {
   std::optional<double> fov_h_rad;
   std::optional<glm::dvec3> gimbal_rad;
   std::uint32_t entity_count = 0;
+  std::uint32_t part_count = 0;
 };
 
 /// Image of a further camera of a frame.
@@ -88,18 +90,21 @@ class JournalWriter {
       : ring_(ring), written_(written) {}
 
   /// Fills in the head's sequence and writes the line. It returns false when the line was lost.
-  template <class Line, class Element = std::byte>
-  bool write(Line& line, std::span<const Element> elements = {}) noexcept {
-    static_assert(std::is_trivially_copyable_v<Line> && std::is_trivially_copyable_v<Element>);
+  template <class Line, class... Element>
+  bool write(Line& line, std::span<const Element>... elements) noexcept {
+    static_assert(std::is_trivially_copyable_v<Line> &&
+                  (std::is_trivially_copyable_v<Element> && ...));
     line.head.sequence = ++sequence_;
-    const std::span<std::byte> memory = ring_.claim(sizeof(Line) + elements.size_bytes());
+    std::span<std::byte> memory = ring_.claim((sizeof(Line) + ... + elements.size_bytes()));
     if (memory.empty()) {
       return false;
     }
-    std::memcpy(memory.data(), &line, sizeof(Line));
-    if (!elements.empty()) {
-      std::memcpy(memory.data() + sizeof(Line), elements.data(), elements.size_bytes());
-    }
+    const auto put = [&memory](std::span<const std::byte> bytes) {
+      if (!bytes.empty()) std::memcpy(memory.data(), bytes.data(), bytes.size());
+      memory = memory.subspan(bytes.size());
+    };
+    put(std::as_bytes(std::span(&line, 1)));
+    (put(std::as_bytes(elements)), ...);
     ring_.commit();
     written_.fetch_add(1, std::memory_order_release);
     return true;

@@ -63,6 +63,26 @@ struct StatusReply {
 /// Largest number of weather changes that come with one frame. Further ones replace the newest.
 inline constexpr std::size_t kMaxWeatherPerFrame = 32;
 
+/// Largest number of commands to parts that come with one frame. Further ones are refused.
+inline constexpr std::size_t kMaxPartsPerJob = 128;
+
+/// Command to a part of an entity, from an instant on.
+struct TimedPart {
+  std::int64_t sim_time_ns = 0;
+  renderer::PartUpdate update;
+};
+/// Returns the renderer's form of a host's command to a part.
+[[nodiscard]] inline TimedPart timed_part(const protocol::PartCommandData& part,
+                                          std::int64_t sim_time_ns) noexcept {
+  using From = protocol::PartCommandData::Kind;
+  using To = scene::PartCommand::Kind;
+  const To kind = part.kind == From::temperature ? To::temperature
+                  : part.kind == From::power     ? To::power
+                  : part.kind == From::throttle  ? To::throttle
+                                                 : To::off;
+  return {sim_time_ns, {part.entity_id, part.part_id, {kind, part.value}}};
+}
+
 /// One camera's part in a frame.
 struct CameraShot {
   bool due = false;  ///< false: no channel of this camera shows the frame
@@ -72,7 +92,7 @@ struct CameraShot {
 };
 
 /// Message of conductor to render agent, in the order in which the source must see it. The weather
-/// of a frame is applied first, then its entities.
+/// of a frame is applied first, then its parts and its entities.
 struct RenderJob {
   enum class Kind : std::uint8_t { frame, reset };
   Kind kind = Kind::frame;
@@ -87,6 +107,8 @@ struct RenderJob {
   std::int64_t display_ns = 0;  ///< wall instant at which the frame is shown
   std::uint32_t weather_count = 0;
   std::array<scene::WeatherSample, kMaxWeatherPerFrame> weather;
+  std::uint32_t part_count = 0;
+  std::array<TimedPart, kMaxPartsPerJob> parts;
   std::uint32_t entity_count = 0;
   std::array<renderer::EntityUpdate, protocol::kMaxEntitiesPerFrame> entities;
 };

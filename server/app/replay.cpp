@@ -35,6 +35,10 @@ struct JournalPlayer::PendingWeather {
   std::uint64_t host_frame_number = 0;
   scene::WeatherSample sample;
 };
+struct JournalPlayer::PendingPart {
+  std::uint64_t host_frame_number = 0;
+  TimedPart part;
+};
 
 JournalPlayer::JournalPlayer(FrameSource& source, ChannelTable channels)
     : source_(source), channels_(std::move(channels)) {}
@@ -63,6 +67,7 @@ physics::Result<std::optional<ReplayedFrame>> JournalPlayer::apply(const v1::Jou
     release_shown();
     source_.reset();
     weather_.clear();
+    parts_.clear();
     render_number_ = 0;
     run_id_ = entry.run_start().run_id();
     started_ = true;
@@ -74,6 +79,13 @@ physics::Result<std::optional<ReplayedFrame>> JournalPlayer::apply(const v1::Jou
   }
   if (entry.has_host_frame()) {
     const v1::HostFrame& frame = entry.host_frame();
+    for (const v1::PartCommand& part : frame.parts()) {
+      protocol::PartCommandData data;
+      if (protocol::from_proto(part, data) != protocol::DecodeStatus::ok) {
+        return fail("drive of a part out of range");
+      }
+      parts_.push_back({frame.frame_number(), timed_part(data, frame.sim_time_ns())});
+    }
     if (frame.has_environment()) {
       protocol::EnvironmentData data;
       if (protocol::from_proto(frame.environment(), data) != protocol::DecodeStatus::ok) {
@@ -158,6 +170,15 @@ physics::Result<std::optional<ReplayedFrame>> JournalPlayer::play(const v1::Fram
       }
     }
     weather_.erase(weather_.begin(), later);
+
+    // Commands to parts act by the same rule. The live run refused those it had no room for.
+    const auto later_part = std::find_if(parts_.begin(), parts_.end(), [&](const auto& pending) {
+      return pending.host_frame_number > decision.host_frame_number();
+    });
+    for (auto pending = parts_.begin(); pending != later_part; ++pending) {
+      static_cast<void>(source_.apply_part(pending->part.sim_time_ns, pending->part.update));
+    }
+    parts_.erase(parts_.begin(), later_part);
 
     std::vector<renderer::EntityUpdate> updates;
     for (const v1::EntityState& state : decision.entities()) {

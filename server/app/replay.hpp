@@ -62,6 +62,7 @@ class JournalPlayer {
 
  private:
   struct PendingWeather;
+  struct PendingPart;
   /// Renders what one camera showed. `shot` is the decision, for the first one, or one of its
   /// CameraDecision.
   template <class Shot>
@@ -81,6 +82,7 @@ class JournalPlayer {
   const renderer::FrameView* view_ = nullptr;
   std::uint32_t view_crc_ = 0;
   std::vector<PendingWeather> weather_;  ///< accepted, but not used by a frame yet
+  std::vector<PendingPart> parts_;       ///< likewise
   std::uint64_t render_number_ = 0;
   std::uint64_t frames_ = 0;
   std::uint64_t mismatches_ = 0;

@@ -78,7 +78,8 @@ CigiHost::CigiHost(const Options& options, std::unique_ptr<SceneQuery> scene, Co
       clock_(options.synchronous ? period_ns_ : 0),
       entities_(earth_, scene_.get(), entity_options(options)),
       queries_(earth_, entities_, scene_.get()),
-      weather_(options.scenario) {}
+      weather_(options.scenario),
+      heat_(options.scenario, options.cigi.entities) {}
 
 void CigiHost::take(std::span<const std::byte> datagram, std::int64_t received_ns) noexcept {
   cigi::Reader reader(datagram, cigi::Sender::host);
@@ -198,6 +199,7 @@ void CigiHost::forget() noexcept {
   entities_.clear();
   queries_.clear();
   weather_.clear();
+  heat_.clear();
   told_count_ = 0;
   sky_.reset();
   fov_h_rad_.reset();
@@ -230,7 +232,8 @@ void CigiHost::take_packet(const cigi::Packet& packet) noexcept {
         } else if constexpr (std::is_same_v<T, cigi::WeatherControl>) {
           if (!weather_.take(in)) no_effect(in, "only global cloud layers 1 to 3 count");
         } else if constexpr (std::is_same_v<T, cigi::ComponentControl>) {
-          if (!weather_.take(in)) no_effect(in, "unknown component, or out of range");
+          if (!weather_.take(in) && !heat_.take(in))
+            no_effect(in, "unknown component, or out of range");
         } else if constexpr (std::is_same_v<T, cigi::CelestialSphereControl>) {
           take_sky(in);
         } else if constexpr (std::is_same_v<T, cigi::HatHotRequest> ||
@@ -239,7 +242,7 @@ void CigiHost::take_packet(const cigi::Packet& packet) noexcept {
                              std::is_same_v<T, cigi::PositionRequest>) {
           ask(in);
         } else if constexpr (std::is_same_v<T, cigi::ShortComponentControl>) {
-          no_effect(in, "unknown component");
+          if (!heat_.take(in)) no_effect(in, "unknown component, or out of range");
         } else if constexpr (std::is_same_v<T, cigi::EarthReferenceModel>) {
           if (in.custom_enabled) no_effect(in, "the ellipsoid stays WGS-84");
         } else if constexpr (std::is_same_v<T, cigi::SensorControl>) {
@@ -345,6 +348,7 @@ void CigiHost::take_sky(const cigi::CelestialSphereControl& packet) noexcept {
   ++run_id_;
   entities_.mark_all(true);
   weather_.mark();
+  heat_.mark_all();
   events_.push(EventKind::gateway_time, static_cast<std::uint64_t>(clock_.time_ns()));
 }
 
@@ -404,10 +408,12 @@ bool CigiHost::next(protocol::HostFrameData& frame, std::int64_t /*now_ns*/) noe
   frame.environment = weather_.take_change(frame.sim_time_ns);
   frame.fov_h_rad = fov_h_rad_;
   frame.gimbal_rad.reset();
+  heat_.fill(frame);
   if (!check(frame)) {
     // The next frame tells all that this one would have told.
     entities_.mark_all(false);
     weather_.mark();
+    heat_.mark_all();
     return false;
   }
   if (options_.synchronous) {
@@ -462,6 +468,7 @@ void CigiHost::report(const GatewayReport& report) noexcept {
     // The host does not send again what it has sent once.
     entities_.mark_all(true);
     weather_.mark();
+    heat_.mark_all();
     awaits_ = false;
     return;
   }

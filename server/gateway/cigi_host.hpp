@@ -14,6 +14,7 @@
 #include "emit/scene/scene_desc.hpp"
 #include "gateway/cigi_clock.hpp"
 #include "gateway/cigi_entities.hpp"
+#include "gateway/cigi_heat.hpp"
 #include "gateway/cigi_queries.hpp"
 #include "gateway/cigi_weather.hpp"
 #include "gateway/georeference.hpp"
@@ -100,6 +101,7 @@ class CigiHost final : public HostGateway {
   CigiEntities entities_;
   CigiQueries queries_;
   CigiWeather weather_;
+  CigiHeat heat_;
 
   protocol::cigi::IgMode mode_ = protocol::cigi::IgMode::standby;
   std::int8_t database_ = 0;      ///< as Start Of Frame has it

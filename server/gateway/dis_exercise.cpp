@@ -218,6 +218,7 @@ bool DisExercise::next(protocol::HostFrameData& frame, std::int64_t now_ns) noex
   frame.environment.reset();
   frame.fov_h_rad.reset();
   frame.gimbal_rad.reset();
+  frame.part_count = 0;
   frame.entity_count = 0;
   for (std::size_t i = 1; i < entities_.size(); ++i) {
     Entity& entity = entities_[i];

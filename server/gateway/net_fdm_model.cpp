@@ -49,6 +49,7 @@ bool NetFdmModel::next(protocol::HostFrameData& frame, std::int64_t /*now_ns*/) 
   frame.environment.reset();
   frame.fov_h_rad.reset();
   frame.gimbal_rad.reset();
+  frame.part_count = 0;
   const physics::GeoPlace place = {physics::Radians(state_.latitude_rad),
                                    physics::Radians(state_.longitude_rad),
                                    physics::Metres(state_.altitude_m)};

@@ -21,6 +21,9 @@ ScenarioTracks::ScenarioTracks(const std::optional<scene::ScenarioDesc>& scenari
     }
     entity.start.on = object.on;
     entity.trajectory = object.trajectory;
+    for (const scene::PartDesc& part : object.parts) {
+      entity.parts.push_back({part.id, part.curve.given});
+    }
     entities_.push_back(std::move(entity));
   }
   std::sort(entities_.begin(), entities_.end(),
@@ -37,6 +40,19 @@ const ScenarioTracks::Entity* ScenarioTracks::find(std::uint32_t entity_id) cons
 
 bool ScenarioTracks::knows(std::uint32_t entity_id) const noexcept {
   return any_entity_ || find(entity_id) != nullptr;
+}
+
+bool ScenarioTracks::takes(std::uint32_t entity_id, std::uint32_t part_id,
+                           scene::PartCommand::Kind drive) const noexcept {
+  if (any_entity_) {
+    return true;
+  }
+  const Entity* entity = find(entity_id);
+  return entity != nullptr &&
+         std::any_of(entity->parts.begin(), entity->parts.end(), [&](const Entity::Part& part) {
+           return part.id == part_id &&
+                  (drive != scene::PartCommand::Kind::throttle || part.takes_throttle);
+         });
 }
 
 scene::TrajectoryState ScenarioTracks::entity_at(std::uint32_t entity_id,

@@ -40,6 +40,8 @@ namespace emit::server {
   X(refused_internal, "messages refused: failure inside emitd")                            \
   X(refused_invalid_environment, "host frames refused: invalid environment")               \
   X(refused_invalid_view, "fields of view refused: outside the sensor's range")            \
+  X(refused_invalid_part, "host frames refused: drive of a part out of range")             \
+  X(refused_unknown_part, "commands to parts refused: unknown part, or no throttle")       \
   X(statuses_suppressed, "answers not sent: rate limit, no room, or to an answer")         \
   X(connections_accepted, "TCP connections accepted")                                      \
   X(connections_closed, "TCP connections closed")                                          \

@@ -62,6 +62,13 @@ void expect_equal(const HostFrameData& a, const HostFrameData& b) {
     EXPECT_EQ(a.entities[i].pose.world_from_body, b.entities[i].pose.world_from_body);
     expect_equal(a.entities[i].rates, b.entities[i].rates);
   }
+  ASSERT_EQ(a.part_count, b.part_count);
+  for (std::uint32_t i = 0; i < a.part_count; ++i) {
+    EXPECT_EQ(a.parts[i].entity_id, b.parts[i].entity_id);
+    EXPECT_EQ(a.parts[i].part_id, b.parts[i].part_id);
+    EXPECT_EQ(a.parts[i].kind, b.parts[i].kind);
+    EXPECT_EQ(a.parts[i].value, b.parts[i].value);
+  }
   ASSERT_EQ(a.environment.has_value(), b.environment.has_value());
   if (!a.environment) return;
   EXPECT_EQ(a.environment->direct_normal_w_m2, b.environment->direct_normal_w_m2);
@@ -113,6 +120,72 @@ TEST(HostFrameCodec, DecodesTheGoldenBytes) {
   EXPECT_EQ(out->seeker.world_from_body, glm::dquat(1.0, 0.0, 0.0, 0.0));
   HostFrameEncoder encoder;
   EXPECT_EQ(test::to_hex(encoder.encode(*out)), test::to_hex(bytes));
+}
+
+TEST(HostFrameCodec, DecodesTheGoldenBytesOfParts) {
+  // The frame of the other golden bytes is followed by part 2 of entity 300 at throttle 0.5, part 1
+  // of entity 3 off. The bytes were written by hand after the Protobuf encoding rules.
+  const auto bytes = test::from_hex(
+      "0801"
+      "10ac02"
+      "190500000000000000"
+      "221f"
+      "0a12"
+      "09000000000000f03f"
+      "110000000000000040"
+      "1209"
+      "09000000000000f03f"
+      "3807"
+      "720e"
+      "08ac02"
+      "1002"
+      "29000000000000e03f"
+      "7204"
+      "0803"
+      "1001");
+  HostFrameDecoder decoder;
+  const auto out = std::make_unique<HostFrameData>();
+  ASSERT_EQ(decode_host_frame(bytes, decoder, *out), DecodeStatus::ok);
+  ASSERT_EQ(out->part_count, 2U);
+  EXPECT_EQ(out->parts[0].entity_id, 300U);
+  EXPECT_EQ(out->parts[0].part_id, 2U);
+  EXPECT_EQ(out->parts[0].kind, PartCommandData::Kind::throttle);
+  EXPECT_EQ(out->parts[0].value, 0.5);
+  EXPECT_EQ(out->parts[1].entity_id, 3U);
+  EXPECT_EQ(out->parts[1].kind, PartCommandData::Kind::off);
+  HostFrameEncoder encoder;
+  EXPECT_EQ(test::to_hex(encoder.encode(*out)), test::to_hex(bytes));
+}
+
+TEST(HostFrameCodec, RefusesPartsOutsideTheirRangesTwiceOrTooMany) {
+  using Change = void (*)(v1::PartCommand&);
+  const Change changes[] = {
+      [](v1::PartCommand& p) { p.set_part_id(0); },
+      [](v1::PartCommand& p) { p.set_part_id(65536); },
+      [](v1::PartCommand& p) { p.set_temperature_k(49.0); },
+      [](v1::PartCommand& p) { p.set_temperature_k(std::numeric_limits<double>::quiet_NaN()); },
+      [](v1::PartCommand& p) { p.set_power_w_m2(-1.0); },
+      [](v1::PartCommand& p) { p.set_power_w_m2(1e7); },
+      [](v1::PartCommand& p) { p.set_throttle(1.01); },
+      [](v1::PartCommand& p) { p.set_throttle(std::numeric_limits<double>::infinity()); },
+  };
+  for (const Change change : changes) {
+    auto message = valid_message();
+    change(*message.mutable_parts(0));
+    EXPECT_EQ(decode(encoded(message)), DecodeStatus::invalid_part);
+  }
+  auto twice = valid_message();
+  twice.mutable_parts(1)->set_part_id(twice.parts(0).part_id());
+  EXPECT_EQ(decode(encoded(twice)), DecodeStatus::invalid_part);
+  auto many = valid_message();
+  while (many.parts_size() < 32) {
+    v1::PartCommand& part = *many.add_parts();
+    part.set_entity_id(100);
+    part.set_part_id(static_cast<std::uint32_t>(many.parts_size()));
+  }
+  EXPECT_EQ(decode(encoded(many)), DecodeStatus::ok);
+  many.add_parts()->set_entity_id(101);
+  EXPECT_EQ(decode(encoded(many)), DecodeStatus::oversize);
 }
 
 TEST(HostFrameCodec, DoesNotAllocateInSteadyState) {
@@ -332,9 +405,10 @@ TEST(ControlRecord, AHostFrameWithinIsFoundWithoutParsing) {
 }
 
 TEST(DecodeStatus, HasTheNumbersOfStatusCode) {
-  for (const auto status : {DecodeStatus::ok, DecodeStatus::wrong_version, DecodeStatus::oversize,
-                            DecodeStatus::malformed, DecodeStatus::invalid_pose,
-                            DecodeStatus::invalid_environment, DecodeStatus::invalid_view}) {
+  for (const auto status :
+       {DecodeStatus::ok, DecodeStatus::wrong_version, DecodeStatus::oversize,
+        DecodeStatus::malformed, DecodeStatus::invalid_pose, DecodeStatus::invalid_environment,
+        DecodeStatus::invalid_view, DecodeStatus::invalid_part}) {
     EXPECT_TRUE(v1::Status::Code_IsValid(static_cast<int>(status)));
     EXPECT_NE(to_string(status), "unknown");
   }

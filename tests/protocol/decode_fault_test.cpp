@@ -43,6 +43,12 @@ std::vector<Case> cases() {
        "invalid environment: air_k is 400.5, must be 180 to 340"},
       {[](auto& frame) { frame.environment->film_w_m2_k = -1.0; },
        "invalid environment: film_w_m2_k is -1, must be 0 to 1000"},
+      {[](auto& frame) { frame.parts[0].value = 4000.0; },
+       "invalid part: entity 7, part 1: temperature_k is 4000, must be 50 to 3000"},
+      {[](auto& frame) { frame.parts[2].value = -0.5; },
+       "invalid part: entity 14, part 1: throttle is -0.5, must be 0 to 1"},
+      {[](auto& frame) { frame.parts[1].part_id = 1; },
+       "invalid part: entity 7, part 1 stands in the frame twice"},
       {[](auto& frame) { frame.sim_time_ns = 2 * kMaxSimTimeNs; },
        "malformed message: sim_time_ns is 2e+18, must be -1e+18 to 1e+18"},
   };

@@ -28,6 +28,11 @@ inline std::unique_ptr<protocol::HostFrameData> make_host_frame(std::uint32_t en
     entity.on = i % 4 != 3;
     entity.teleport = i % 5 == 0;
   }
+  frame->parts[0] = {7, 1, protocol::PartCommandData::Kind::temperature, 612.5};
+  frame->parts[1] = {7, 2, protocol::PartCommandData::Kind::power, 0.1};
+  frame->parts[2] = {14, 1, protocol::PartCommandData::Kind::throttle, 0.75};
+  frame->parts[3] = {14, 65535, protocol::PartCommandData::Kind::off, 0.0};
+  frame->part_count = 4;
   auto& environment = frame->environment.emplace();
   environment.direct_normal_w_m2 = 800.0;
   environment.diffuse_horizontal_w_m2 = 90.0;

@@ -45,7 +45,7 @@ std::vector<std::map<std::string, std::string>> rows_of(const std::filesystem::p
   return rows;
 }
 
-TEST(LogCsv, AJournalBecomesSixTables) {
+TEST(LogCsv, AJournalBecomesATableOfEachKind) {
   const LogFolder folder;
   const auto in = folder.file("in.mcap");
   write_journal(in);
@@ -83,6 +83,28 @@ TEST(LogCsv, AJournalBecomesSixTables) {
   EXPECT_EQ(events[2].at("sequence"), "11");
   EXPECT_EQ(events[2].at("missing_entries"), "2");
   EXPECT_TRUE(rows_of(out / "entities.csv").empty());
+}
+
+TEST(LogCsv, CommandsToPartsStandInATableOfTheirOwn) {
+  const LogFolder folder;
+  const auto in = folder.file("in.mcap");
+  const auto out = folder.file("parts.csv");
+  {
+    auto writer = LogWriter::create(in);
+    ASSERT_TRUE(writer->write_host(*test::make_host_frame(0), 0));
+  }
+  const auto done = export_log_csv(in, out, {.table = LogTable::parts});
+  ASSERT_TRUE(done) << done.error().text;
+  const auto rows = rows_of(out);
+  ASSERT_EQ(rows.size(), 4U);
+  EXPECT_EQ(rows[0].at("entity_id"), "7");
+  EXPECT_EQ(rows[0].at("part_id"), "1");
+  EXPECT_EQ(rows[0].at("temperature_k"), "612.5");
+  EXPECT_EQ(rows[0].at("throttle"), "");
+  EXPECT_EQ(rows[1].at("power_w_m2"), "0.10000000000000001");
+  EXPECT_EQ(rows[2].at("throttle"), "0.75");
+  EXPECT_EQ(rows[3].at("temperature_k") + rows[3].at("power_w_m2") + rows[3].at("throttle"), "")
+      << "off";
 }
 
 TEST(LogCsv, TheTableOfTheSeekerIsAPoseLogWithTheSamePoses) {

@@ -226,6 +226,16 @@ void write_pose_log(const std::filesystem::path& file) {
     if (i != 1) frame->environment.reset();
     frame->frame_number = i;
     frame->sim_time_ns = static_cast<std::int64_t>(i) * 10'000'000;
+    frame->part_count = 0;
+    const auto drive = [&](std::uint32_t part_id, double throttle) {
+      frame->parts[frame->part_count++] = {1, part_id, PartCommandData::Kind::throttle, throttle};
+    };
+    if (i == 1) drive(1, 0.25);
+    if (i == 2) drive(1, 0.5);
+    if (i == 3) drive(2, 1.0);
+    if (i == 6) drive(2, 0.0);
+    if (i == 2) frame->fov_h_rad = 0.125;
+    if (i == 3) frame->gimbal_rad = glm::dvec3(0.1, 0.2, 0.3);
     const auto add = [&](std::uint32_t id, double x, bool has_pose, bool on) {
       EntityStateData& state = frame->entities[frame->entity_count++];
       state.entity_id = id;
@@ -258,6 +268,8 @@ TEST(LogCut, TheFirstFrameOfAPoseLogCarriesWhatEarlierOnesSet) {
   EXPECT_EQ(cut->frames, 3U);
   EXPECT_EQ(cut->carried_entities, 2U);
   EXPECT_TRUE(cut->carried_weather);
+  EXPECT_EQ(cut->carried_parts, 1U);
+  EXPECT_TRUE(cut->carried_view);
   auto log = LogReader::open(out);
   ASSERT_TRUE(log && log->next().value());
   const HostFrameData first = log->host();
@@ -272,6 +284,13 @@ TEST(LogCut, TheFirstFrameOfAPoseLogCarriesWhatEarlierOnesSet) {
   EXPECT_EQ(first.entities[1].pose.position_world_m.x, 11.0);
   EXPECT_TRUE(first.entities[1].teleport);
   EXPECT_FALSE(first.entities[1].rates);
+  ASSERT_EQ(first.part_count, 2U);
+  EXPECT_EQ(first.parts[0].part_id, 2U);
+  EXPECT_EQ(first.parts[0].value, 0.0) << "the frame's own command counts";
+  EXPECT_EQ(first.parts[1].part_id, 1U);
+  EXPECT_EQ(first.parts[1].value, 0.5);
+  EXPECT_EQ(first.fov_h_rad, 0.125);
+  EXPECT_EQ(first.gimbal_rad, glm::dvec3(0.1, 0.2, 0.3));
   const auto whole = messages_of(in);
   const auto kept = messages_of(out);
   ASSERT_EQ(kept.size(), 3U);

@@ -79,6 +79,44 @@ TEST_F(PoseCsv, ErrorsNameFileLineAndColumn) {
               HasSubstr(":3:1: column 'sim_time_s': goes back from 1 to 0"));
 }
 
+TEST_F(PoseCsv, ColumnsOfPartsDriveThem) {
+  using Kind = PartCommandData::Kind;
+  std::ofstream(path_) << "sim_time_s,entity_7.part_1.temperature_k,east_m,north_m,up_m,qw,qx,qy,"
+                          "qz,entity_12.part_3.throttle\n"
+                          "0,450.5,0,0,0,1,0,0,0,\n"
+                          "1,,0,0,0,1,0,0,0,\n"
+                          "2,off,0,0,0,1,0,0,0,0.25\n";
+  auto reader = PoseCsvReader::open(path_);
+  ASSERT_TRUE(reader) << reader.error().text;
+  ASSERT_TRUE(reader->next().value());
+  ASSERT_EQ(reader->host().part_count, 1U);
+  EXPECT_EQ(reader->host().parts[0].entity_id, 7U);
+  EXPECT_EQ(reader->host().parts[0].part_id, 1U);
+  EXPECT_EQ(reader->host().parts[0].kind, Kind::temperature);
+  EXPECT_EQ(reader->host().parts[0].value, 450.5);
+  ASSERT_TRUE(reader->next().value());
+  EXPECT_EQ(reader->host().part_count, 0U);
+  ASSERT_TRUE(reader->next().value());
+  ASSERT_EQ(reader->host().part_count, 2U);
+  EXPECT_EQ(reader->host().parts[0].kind, Kind::off);
+  EXPECT_EQ(reader->host().parts[1].entity_id, 12U);
+  EXPECT_EQ(reader->host().parts[1].part_id, 3U);
+  EXPECT_EQ(reader->host().parts[1].kind, Kind::throttle);
+  EXPECT_EQ(reader->host().parts[1].value, 0.25);
+}
+
+TEST_F(PoseCsv, ErrorsOfPartsNameLineAndColumn) {
+  const std::string head = "sim_time_s,east_m,north_m,up_m,qw,qx,qy,qz,entity_7.part_1.power_w_m2";
+  EXPECT_THAT(outcome(head + "\n0,0,0,0,1,0,0,0,hot\n"),
+              HasSubstr(":2:17: column 'entity_7.part_1.power_w_m2': 'hot' is not a number"));
+  EXPECT_THAT(outcome(head + "\n0,0,0,0,1,0,0,0,-1\n"),
+              HasSubstr("power_w_m2 is -1, must be 0 to 1000000"));
+  EXPECT_THAT(outcome(head + ",entity_7.part_1.throttle\n"),
+              HasSubstr("column 'entity_7.part_1.throttle': another column drives this part"));
+  EXPECT_EQ(outcome(head + ",entity_7.part_x.throttle\n0,0,0,0,1,0,0,0,,x\n"), "1 rows")
+      << "another name";
+}
+
 /// Logs as spreadsheets write them are read like plain ones.
 TEST_F(PoseCsv, SpreadsheetDialectsAreReadAlike) {
   const std::string head = "sim_time_s,east_m,north_m,up_m,qw,qx,qy,qz";

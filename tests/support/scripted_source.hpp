@@ -25,6 +25,7 @@ struct SourceScript {
       renderer::QualityLevelStats{}};  ///< quality ladder
   std::vector<renderer::FrameRequest> submitted;
   std::vector<std::pair<std::int64_t, std::vector<renderer::EntityUpdate>>> entities;
+  std::vector<std::pair<std::int64_t, renderer::PartUpdate>> parts;
   std::vector<scene::WeatherSample> weather;
   std::vector<std::string> order;  ///< kinds of calls, in order
   int resets = 0;
@@ -66,6 +67,16 @@ class ScriptedSource final : public server::FrameSource {
       mix(static_cast<double>(sim_time_ns));
     }
     return updates.size();
+  }
+  bool apply_part(std::int64_t sim_time_ns, const renderer::PartUpdate& update) noexcept override {
+    script_.parts.emplace_back(sim_time_ns, update);
+    script_.order.emplace_back("part");
+    mix(update.entity_id);
+    mix(update.part_id);
+    mix(static_cast<double>(update.command.kind));
+    mix(update.command.value);
+    mix(static_cast<double>(sim_time_ns));
+    return true;
   }
   bool apply_weather(const scene::WeatherSample& sample) noexcept override {
     if (script_.weather_full) {

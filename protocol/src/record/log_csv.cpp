@@ -50,6 +50,8 @@ std::string header_of(LogTable table) {
           "{},direct_normal_w_m2,diffuse_horizontal_w_m2,longwave_down_w_m2,air_k,wind_m_s,"
           "cloud_frac,environment_k,film_w_m2_k",
           kHostColumns);
+    case LogTable::parts:
+      return fmt::format("{},entity_id,part_id,temperature_k,power_w_m2,throttle", kHostColumns);
     case LogTable::events:
       return "event,run_id,sequence,log_time_ns,command,missing_entries,scenario,scenario_sha256,"
              "software,device,pacing,first_time_s,text";
@@ -204,6 +206,16 @@ class Exporter {
         } else {
           file->empty(kPoseCells + kRateCells);
         }
+        file->end_row();
+      }
+    }
+    if (CsvFile* file = of(LogTable::parts)) {
+      for (const v1::PartCommand& part : frame.parts()) {
+        put_origin(*file, frame, origin);
+        file->whole(std::uint64_t{part.entity_id()}).whole(std::uint64_t{part.part_id()});
+        part.has_temperature_k() ? file->number(part.temperature_k()) : file->empty();
+        part.has_power_w_m2() ? file->number(part.power_w_m2()) : file->empty();
+        part.has_throttle() ? file->number(part.throttle()) : file->empty();
         file->end_row();
       }
     }

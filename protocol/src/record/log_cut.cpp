@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "emit/protocol/convert.hpp"
@@ -141,6 +142,11 @@ class PoseCut {
  private:
   void remember(const HostFrameData& frame) {
     if (frame.environment) weather_ = frame.environment;
+    if (frame.fov_h_rad) fov_h_rad_ = frame.fov_h_rad;
+    if (frame.gimbal_rad) gimbal_rad_ = frame.gimbal_rad;
+    for (const PartCommandData& part : frame.part_span()) {
+      parts_[{part.entity_id, part.part_id}] = part;
+    }
     for (const EntityStateData& state : frame.entity_span()) {
       EntityStateData& kept = entities_[state.entity_id];
       const EntityStateData before = kept;
@@ -163,6 +169,14 @@ class PoseCut {
       first.environment = weather_;
       summary.carried_weather = true;
     }
+    if (!first.fov_h_rad && fov_h_rad_) {
+      first.fov_h_rad = fov_h_rad_;
+      summary.carried_view = true;
+    }
+    if (!first.gimbal_rad && gimbal_rad_) {
+      first.gimbal_rad = gimbal_rad_;
+      summary.carried_view = true;
+    }
     for (std::uint32_t i = 0; i < frame.entity_count; ++i) {
       const auto earlier = entities_.find(frame.entities[i].entity_id);
       if (earlier == entities_.end()) continue;
@@ -183,7 +197,23 @@ class PoseCut {
     }
     for (const auto& [id, state] : entities_) first.entities[first.entity_count++] = state;
     summary.carried_entities += entities_.size();
-    if (!summary.carried_weather && summary.carried_entities == 0) return {};
+    for (const PartCommandData& part : frame.part_span()) {
+      parts_.erase({part.entity_id, part.part_id});
+    }
+    if (first.part_count + parts_.size() > kMaxPartsPerFrame) {
+      return make_error(
+          ErrorCode::unsupported,
+          fmt::format("{}: offset {}: the first frame would have to carry commands to {} parts, at "
+                      "most {} fit; begin the range earlier",
+                      reader.path().string(), reader.message().file_offset,
+                      first.part_count + parts_.size(), kMaxPartsPerFrame));
+    }
+    for (const auto& [id, part] : parts_) first.parts[first.part_count++] = part;
+    summary.carried_parts = parts_.size();
+    if (!summary.carried_weather && !summary.carried_view && summary.carried_entities == 0 &&
+        summary.carried_parts == 0) {
+      return {};
+    }
     HostFrameEncoder encoder;
     const auto bytes = encoder.encode(first);
     replaced.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
@@ -197,7 +227,10 @@ class PoseCut {
   std::size_t runs_begun_ = 0;
   std::uint64_t run_id_ = 0;
   std::optional<EnvironmentData> weather_;
+  std::optional<double> fov_h_rad_;
+  std::optional<glm::dvec3> gimbal_rad_;
   std::map<std::uint32_t, EntityStateData> entities_;
+  std::map<std::pair<std::uint32_t, std::uint32_t>, PartCommandData> parts_;
   bool done_ = false;
 };
 

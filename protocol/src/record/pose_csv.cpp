@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "emit/physics/csv.hpp"
 #include "emit/physics/limits.hpp"
@@ -29,11 +30,55 @@ constexpr std::array<std::string_view, kColumns> kNames{
     "sim_time_s", "east_m", "north_m", "up_m", "qw", "qx", "qy", "qz", "frame_number"};
 constexpr std::size_t kMandatory = kFrame;
 
+/// Column of a drive of a part.
+struct PartColumn {
+  std::size_t place = 0;  ///< position in a row
+  PartCommandData command;
+};
+
+/// Reads a number of a column's name and moves `text` behind it.
+std::optional<std::uint32_t> leading_number(std::string_view& text) {
+  std::uint32_t value = 0;
+  const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (code != std::errc{}) return std::nullopt;
+  text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+  return value;
+}
+
+/// Returns what a column drives whose name is "entity_7.part_1.temperature_k", or power_w_m2 or
+/// throttle in its place; nothing for other names.
+std::optional<PartCommandData> part_of_column(std::string_view name) {
+  using Kind = PartCommandData::Kind;
+  constexpr std::string_view kEntity = "entity_";
+  constexpr std::string_view kPart = ".part_";
+  PartCommandData out;
+  if (!name.starts_with(kEntity)) return std::nullopt;
+  name.remove_prefix(kEntity.size());
+  const auto entity_id = leading_number(name);
+  if (!entity_id || !name.starts_with(kPart)) return std::nullopt;
+  name.remove_prefix(kPart.size());
+  const auto part_id = leading_number(name);
+  if (!part_id) return std::nullopt;
+  out.entity_id = *entity_id;
+  out.part_id = *part_id;
+  if (name == ".temperature_k") {
+    out.kind = Kind::temperature;
+  } else if (name == ".power_w_m2") {
+    out.kind = Kind::power;
+  } else if (name == ".throttle") {
+    out.kind = Kind::throttle;
+  } else {
+    return std::nullopt;
+  }
+  return out;
+}
+
 }  // namespace
 
 struct PoseCsvReader::Impl {
   CsvReader csv;
   std::array<std::optional<std::size_t>, kColumns> place;  ///< position of each column in a row
+  std::vector<PartColumn> part_columns;
   HostFrameData host;
   bool has_row = false;
   std::optional<Error> failure;
@@ -48,6 +93,18 @@ struct PoseCsvReader::Impl {
       } else if (i < kMandatory || has_column(kNames[i])) {
         return tl::unexpected(std::move(found.error()));
       }
+    }
+    for (std::size_t i = 0; i < csv.header().size(); ++i) {
+      const auto part = part_of_column(csv.header()[i].text);
+      if (!part) continue;
+      for (const PartColumn& other : part_columns) {
+        if (other.command.entity_id != part->entity_id || other.command.part_id != part->part_id) {
+          continue;
+        }
+        return fail(csv.header()[i], fmt::format("column '{}': another column drives this part",
+                                                 csv.header()[i].text));
+      }
+      part_columns.push_back({i, *part});
     }
     return {};
   }
@@ -86,6 +143,35 @@ struct PoseCsvReader::Impl {
                                       at.text));
   }
 
+  /// Reads the commands to parts: a number, "off", or nothing where the part goes on as it is.
+  Result<void> read_parts() {
+    host.part_count = 0;
+    for (const PartColumn& column : part_columns) {
+      const CsvCell& at = csv.row()[column.place];
+      if (at.text.empty()) continue;
+      PartCommandData command = column.command;
+      if (at.text == "off") {
+        command.kind = PartCommandData::Kind::off;
+      } else if (const auto value = physics::csv_number(at.text)) {
+        command.value = *value;
+      } else {
+        return fail(at, fmt::format("column '{}': {}", csv.header()[column.place].text,
+                                    physics::not_a_number_text(at.text)));
+      }
+      DecodeFault fault;
+      if (check_part(command, &fault) != DecodeStatus::ok) {
+        return fail(at, fmt::format("column '{}': {} is {}, must be {} to {}",
+                                    csv.header()[column.place].text, fault.field, fault.value,
+                                    fault.lowest, fault.highest));
+      }
+      if (host.part_count == kMaxPartsPerFrame) {
+        return fail(at, fmt::format("more than {} commands to parts in a row", kMaxPartsPerFrame));
+      }
+      host.parts[host.part_count++] = command;
+    }
+    return {};
+  }
+
   Result<void> read_row() {
     std::array<double, kMandatory> values{};
     for (std::size_t i = 0; i < kMandatory; ++i) {
@@ -122,6 +208,7 @@ struct PoseCsvReader::Impl {
                       values[kQx], values[kQy], values[kQz], physics::limits::kQuaternionNorm.lo,
                       physics::limits::kQuaternionNorm.hi));
     }
+    if (auto parts = read_parts(); !parts) return parts;
     host.sim_time_ns = sim_time_ns;
     host.frame_number = *frame;
     has_row = true;

@@ -63,6 +63,7 @@ void Conductor::start_run(std::int64_t now_ns) noexcept {
   const std::uint64_t run_id = ledger_.begin_run(now_ns);
   control_.new_run();
   weather_count_ = 0;
+  part_count_ = 0;
   seeker_.clear();
   prediction_.clear();
   entities_.clear();
@@ -189,6 +190,9 @@ void Conductor::issue(RenderJob& job, FrameLedger::Issued& issued, bool is_step)
   std::copy_n(weather_.begin(), weather_count_, job.weather.begin());
   job.weather_count = static_cast<std::uint32_t>(weather_count_);
   weather_count_ = 0;
+  std::copy_n(parts_.begin(), part_count_, job.parts.begin());
+  job.part_count = static_cast<std::uint32_t>(part_count_);
+  part_count_ = 0;
   ledger_.issue(job, issued);
   context_.jobs.commit();
   context_.bells.render.ring();

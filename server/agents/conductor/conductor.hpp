@@ -66,6 +66,9 @@ class Conductor final : public Agent {
   void store_weather(const protocol::EnvironmentData& environment,
                      std::int64_t sim_time_ns) noexcept;
   void drop_unknown_entities(HostInput& input) noexcept;
+  /// Leaves out commands to parts that the scenario does not have, and what the next frame has no
+  /// room for, and answers them.
+  void drop_unknown_parts(HostInput& input) noexcept;
   /// Leaves out a field of view that the sensor cannot have, and answers it.
   void drop_wrong_view(HostInput& input) noexcept;
   void refuse(const Origin& origin, StatusCode code, std::uint64_t host_frame_number,
@@ -139,6 +142,8 @@ class Conductor final : public Agent {
   bool issued_any_ = false;
   std::array<scene::WeatherSample, kMaxWeatherPerFrame> weather_;  // goes with the next frame
   std::size_t weather_count_ = 0;
+  std::array<TimedPart, kMaxPartsPerJob> parts_;  // go with the next frame
+  std::size_t part_count_ = 0;
 
   std::atomic<bool> draining_{false};
   std::atomic<bool> drained_{false};

@@ -82,6 +82,7 @@ bool Conductor::take_frame(HostInput& input, std::int64_t now_ns) noexcept {
   }
   gate_.accept(frame);
   drop_unknown_entities(input);
+  drop_unknown_parts(input);
   drop_wrong_view(input);
   context_.counters.add(Counter::host_frames_accepted);
   if (gate.missing > 0) {
@@ -124,6 +125,9 @@ void Conductor::store(const HostFrameData& frame) noexcept {
   }
   if (frame.fov_h_rad) fov_h_rad_ = *frame.fov_h_rad;
   if (frame.gimbal_rad) body_from_detector_ = physics::body_from_turned(*frame.gimbal_rad);
+  for (const protocol::PartCommandData& part : frame.part_span()) {
+    parts_[part_count_++] = timed_part(part, frame.sim_time_ns);  // drop_unknown_parts() left room
+  }
   if (frame.environment) {
     store_weather(*frame.environment, frame.sim_time_ns);
   }
@@ -166,6 +170,26 @@ void Conductor::drop_unknown_entities(HostInput& input) noexcept {
     ++kept;
   }
   frame.entity_count = kept;
+}
+
+void Conductor::drop_unknown_parts(HostInput& input) noexcept {
+  HostFrameData& frame = input.frame;
+  std::uint32_t kept = 0;
+  for (std::uint32_t i = 0; i < frame.part_count; ++i) {
+    const protocol::PartCommandData part = frame.parts[i];
+    const TimedPart timed = timed_part(part, frame.sim_time_ns);
+    if (!scenario_.takes(part.entity_id, part.part_id, timed.update.command.kind)) {
+      refuse(input.origin, StatusCode::unknown_part, frame.frame_number,
+             protocol::part_detail(part.entity_id, part.part_id));
+      continue;
+    }
+    if (part_count_ + kept == parts_.size()) {
+      refuse(input.origin, StatusCode::overloaded, frame.frame_number, part.entity_id);
+      continue;
+    }
+    frame.parts[kept++] = part;
+  }
+  frame.part_count = kept;
 }
 
 void Conductor::drop_wrong_view(HostInput& input) noexcept {
@@ -245,9 +269,9 @@ void Conductor::reply(const Origin& origin, StatusCode code, std::uint64_t host_
 
 void Conductor::report_input(StatusCode code, std::uint64_t host_frame_number,
                              std::uint64_t detail) noexcept {
-  // Entities and views that are refused do not keep the image from coming.
+  // Entities, parts and views that are refused do not keep the image from coming.
   if (code == StatusCode::unknown_entity || code == StatusCode::overloaded ||
-      code == StatusCode::invalid_view) {
+      code == StatusCode::invalid_view || code == StatusCode::unknown_part) {
     return;
   }
   const bool unused = code == StatusCode::ok && detail == protocol::kDetailStopped;

@@ -31,7 +31,8 @@ void ConductorJournal::host_frame(const protocol::HostFrameData& frame,
   line.fov_h_rad = frame.fov_h_rad;
   line.gimbal_rad = frame.gimbal_rad;
   line.entity_count = frame.entity_count;
-  written(writer_.write(line, frame.entity_span()));
+  line.part_count = frame.part_count;
+  written(writer_.write(line, frame.entity_span(), frame.part_span()));
 }
 
 void ConductorJournal::frame(const protocol::FrameHeader& header, const Shown& shown, bool rendered,

@@ -21,25 +21,30 @@ bool read(std::span<const std::byte> bytes, Line& line) {
   return true;
 }
 
-/// Returns the elements behind a line. It returns false when the line does not hold as many as it
-/// says.
-template <class Line, class Element>
-bool read_elements(std::span<const std::byte> bytes, std::uint32_t count, Element* out) {
-  if (count > protocol::kMaxEntitiesPerFrame ||
-      bytes.size() != sizeof(Line) + count * sizeof(Element)) {
+/// Reads `count` elements into the begin of `out`, and moves `bytes` behind them. It returns false
+/// when the bytes or the room do not suffice.
+template <class Elements>
+bool read_elements(std::span<const std::byte>& bytes, std::uint32_t count, Elements& out) {
+  const std::size_t size = count * sizeof(typename Elements::value_type);
+  if (count > out.size() || bytes.size() < size) {
     return false;
   }
   if (count > 0) {
-    std::memcpy(out, bytes.data() + sizeof(Line), count * sizeof(Element));
+    std::memcpy(out.data(), bytes.data(), size);
   }
+  bytes = bytes.subspan(size);
   return true;
 }
 
 bool host_frame(std::span<const std::byte> bytes, v1::HostFrame& out) {
   JournalHostFrame line;
   protocol::HostFrameData frame;
-  if (!read(bytes, line) ||
-      !read_elements<JournalHostFrame>(bytes, line.entity_count, frame.entities.data())) {
+  if (!read(bytes, line)) {
+    return false;
+  }
+  bytes = bytes.subspan(sizeof(line));
+  if (!read_elements(bytes, line.entity_count, frame.entities) ||
+      !read_elements(bytes, line.part_count, frame.parts) || !bytes.empty()) {
     return false;
   }
   frame.frame_number = line.frame_number;
@@ -52,6 +57,7 @@ bool host_frame(std::span<const std::byte> bytes, v1::HostFrame& out) {
   frame.fov_h_rad = line.fov_h_rad;
   frame.gimbal_rad = line.gimbal_rad;
   frame.entity_count = line.entity_count;
+  frame.part_count = line.part_count;
   protocol::to_proto(frame, out);
   return true;
 }
@@ -59,8 +65,11 @@ bool host_frame(std::span<const std::byte> bytes, v1::HostFrame& out) {
 bool decision(std::span<const std::byte> bytes, v1::FrameDecision& out) {
   JournalFrame line;
   std::vector<renderer::EntityUpdate> entities(protocol::kMaxEntitiesPerFrame);
-  if (!read(bytes, line) ||
-      !read_elements<JournalFrame>(bytes, line.entity_count, entities.data())) {
+  if (!read(bytes, line)) {
+    return false;
+  }
+  bytes = bytes.subspan(sizeof(line));
+  if (!read_elements(bytes, line.entity_count, entities) || !bytes.empty()) {
     return false;
   }
   out.set_frame_number(line.frame_number);

@@ -78,6 +78,7 @@ bool RenderAgent::take_job() noexcept {
       InFlight& next = in_flight_[(first_ + count_) % kDepth];
       if (!job_prepared_) {
         apply_weather(*job);
+        apply_parts(*job);
         source_->apply_entities(job->request.sim_time_ns,
                                 std::span(job->entities.data(), job->entity_count));
         next = {};
@@ -196,6 +197,14 @@ void RenderAgent::apply_weather(const RenderJob& job) noexcept {
       context_.render_events.push(EventKind::weather_lost,
                                   static_cast<std::uint64_t>(job.weather[i].sim_time_ns));
     }
+  }
+}
+
+void RenderAgent::apply_parts(const RenderJob& job) noexcept {
+  // The conductor has checked the parts. A command may still be older than the newest one of its
+  // part, where a run goes on behind the scenario's.
+  for (std::uint32_t i = 0; i < job.part_count; ++i) {
+    static_cast<void>(source_->apply_part(job.parts[i].sim_time_ns, job.parts[i].update));
   }
 }
 

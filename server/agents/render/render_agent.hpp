@@ -90,6 +90,7 @@ class RenderAgent final : public Agent {
                                                   const renderer::FrameRequest& first,
                                                   std::int64_t now_ns, std::size_t shots) noexcept;
   void apply_weather(const RenderJob& job) noexcept;
+  void apply_parts(const RenderJob& job) noexcept;
   void note_dropped_poses(std::uint64_t in_run) noexcept;
   void note_device(const renderer::FrameView& view) noexcept;
   /// Sets Context::device_lost, upon which the daemon ends. No frame comes any more.

@@ -13,6 +13,9 @@ class RendererSource final : public FrameSource {
                              std::span<const renderer::EntityUpdate> updates) noexcept override {
     return updates.empty() ? 0 : renderer_->apply_entities(sim_time_ns, updates);
   }
+  bool apply_part(std::int64_t sim_time_ns, const renderer::PartUpdate& update) noexcept override {
+    return renderer_->apply_part(sim_time_ns, update);
+  }
   bool apply_weather(const scene::WeatherSample& sample) noexcept override {
     return renderer_->apply_weather(sample);
   }

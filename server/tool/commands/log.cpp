@@ -94,12 +94,14 @@ std::string counted(std::uint64_t count, std::string_view what) {
 std::string text_of(const protocol::LogCutSummary& cut) {
   if (!cut.journal) {
     std::string text = fmt::format("{} host frames of run {}", cut.frames, cut.run_id);
-    if (cut.carried_entities > 0 || cut.carried_weather) {
-      text += fmt::format("; the first one carries {} of frames before it",
-                          cut.carried_entities == 0 ? std::string("the weather")
-                          : cut.carried_weather
-                              ? fmt::format("the weather and {} entities", cut.carried_entities)
-                              : fmt::format("{} entities", cut.carried_entities));
+    std::vector<std::string> carried;
+    if (cut.carried_weather) carried.emplace_back("the weather");
+    if (cut.carried_view) carried.emplace_back("the view");
+    if (cut.carried_entities > 0) carried.push_back(counted(cut.carried_entities, "state"));
+    if (cut.carried_parts > 0) carried.push_back(counted(cut.carried_parts, "part"));
+    if (!carried.empty()) {
+      text +=
+          fmt::format("; the first one carries {} of frames before it", fmt::join(carried, ", "));
     }
     return text;
   }
@@ -150,7 +152,8 @@ int run_cut(const CutOptions& command) {
     json.set("frames_before", cut->frames_before).set("earlier_runs", cut->earlier_runs);
     json.set("left_out_runs", cut->left_out_runs).set("other_messages", cut->other_messages);
     json.set("carried_entities", cut->carried_entities);
-    json.set("carried_weather", cut->carried_weather);
+    json.set("carried_parts", cut->carried_parts);
+    json.set("carried_weather", cut->carried_weather).set("carried_view", cut->carried_view);
     if (auto done = write_json(*command.json, json); !done) return fail(done.error());
   }
   return kExitOk;

@@ -153,6 +153,7 @@ void make_host_frame(const scene::ScenarioDesc& scenario, std::int64_t start_ns,
   out.run_id = 1;
   out.received_ns = 0;
   out.environment.reset();
+  out.part_count = 0;
   out.seeker = physics::Pose{};
   out.seeker_rates.reset();
   if (!scenario.sensor.trajectory.empty()) {

@@ -104,9 +104,8 @@ class Triggers {
   std::thread thread_;
 };
 
-/// Sends everything that a journal must carry: entities, jumps, weather, hold, stop and step,
-/// reset, a restart of the host.
-/// restart of the host.
+/// Sends everything that a journal must carry: entities, jumps, parts, weather, hold, stop and
+/// step, reset, a restart of the host.
 void drive(client::HostClient& host, client::FrameClient& frames) {
   std::uint64_t number = 0;
   std::uint64_t run = 1;
@@ -123,6 +122,12 @@ void drive(client::HostClient& host, client::FrameClient& frames) {
       frame.entities[i].pose.position_world_m.x = static_cast<double>(number * (i + 1)) / 3.0;
       frame.entities[i].teleport = number % 17 == 0;
       frame.entities[i].on = number % 13 != 0;
+    }
+    if (number % 7 == 0) {
+      frame.parts[0] = {1, 2, protocol::PartCommandData::Kind::throttle,
+                        static_cast<double>(number % 10) / 10.0};
+      frame.parts[1] = {2, 1, protocol::PartCommandData::Kind::off, 0.0};
+      frame.part_count = 2;
     }
     if (number % 11 == 0) {
       frame.environment.emplace();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -121,6 +122,54 @@ TEST_F(CigiHostTest, WhatWaitsForNothingNeedsNoReport) {
   now_ns_ += kFrameNs;
   EXPECT_TRUE(receive());
 }
+
+/// Component Control in both versions of CIGI.
+class CigiPartTest : public CigiHostTest, public testing::WithParamInterface<cigi::Version> {
+ protected:
+  /// Packet that gives the sensor a pose.
+  [[nodiscard]] cigi::Packet placed_seeker() const {
+    if (version_ == cigi::Version::v3_3) return seeker();
+    return cigi::EntityPosition{};
+  }
+};
+
+TEST_P(CigiPartTest, ComponentControlHeatsAPartAndResetSendsItAgain) {
+  version_ = GetParam();
+  make();
+  ASSERT_TRUE(receive());
+  cigi::ComponentControl engine;
+  engine.instance_id = 7;
+  engine.component_id = 2;
+  engine.component_state = 1;
+  engine.data[0] = std::bit_cast<std::uint32_t>(480.5F);
+  cigi::ShortComponentControl wrong;
+  wrong.instance_id = 7;
+  wrong.component_id = 2;
+  wrong.component_state = 3;
+  wrong.data[0] = std::bit_cast<std::uint32_t>(2.0F);
+  send(cigi::IgMode::operate, {placed_seeker(), engine, wrong});
+  ASSERT_TRUE(next());
+  ASSERT_EQ(frame_->part_count, 1U);
+  EXPECT_EQ(frame_->parts[0].entity_id, 7U);
+  EXPECT_EQ(frame_->parts[0].part_id, 2U);
+  EXPECT_EQ(frame_->parts[0].kind, protocol::PartCommandData::Kind::temperature);
+  EXPECT_EQ(frame_->parts[0].value, 480.5);
+  EXPECT_EQ(counters_.get(Counter::gateway_packets_unused), 1U);
+  gateway_->report({GatewayReport::Kind::published, frame_->frame_number});
+  send(cigi::IgMode::operate, {placed_seeker()});
+  ASSERT_TRUE(next());
+  EXPECT_EQ(frame_->part_count, 0U);
+  gateway_->report({GatewayReport::Kind::reset, 0});
+  send(cigi::IgMode::operate, {placed_seeker()});
+  ASSERT_TRUE(next());
+  EXPECT_EQ(frame_->part_count, 1U);
+}
+
+INSTANTIATE_TEST_SUITE_P(Versions, CigiPartTest,
+                         testing::Values(cigi::Version::v3_3, cigi::Version::v4_0),
+                         [](const auto& each) {
+                           return each.param == cigi::Version::v3_3 ? "V33" : "V40";
+                         });
 
 /// View Definition in both versions of CIGI.
 class CigiViewTest : public CigiHostTest, public testing::WithParamInterface<cigi::Version> {};

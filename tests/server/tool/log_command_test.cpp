@@ -192,7 +192,7 @@ TEST_F(CliLog, export_writes_a_folder_or_one_table) {
   const ProcessResult all = log({"export", "csv", log_, "--out", file("tables")});
   EXPECT_EQ(all.exit_code, 0) << all.err;
   for (const char* table :
-       {"seeker", "entities", "frames", "frame_entities", "weather", "events"}) {
+       {"seeker", "entities", "frames", "frame_entities", "weather", "parts", "events"}) {
     EXPECT_THAT(all.out, HasSubstr(std::string("tables/") + table + ".csv: "));
     EXPECT_TRUE(std::filesystem::exists(file("tables") + "/" + table + ".csv")) << table;
   }

@@ -28,7 +28,7 @@ inline constexpr auto kMaxSimTimeNs =
 enum class DecodeStatus : std::uint8_t {
   ok = 1,
   wrong_version = 2,  ///< protocol_version is not kProtocolVersion
-  oversize = 3,       ///< over kMaxHostFrameBytes or kMaxEntitiesPerFrame
+  oversize = 3,       ///< over kMaxHostFrameBytes, kMaxEntitiesPerFrame or kMaxPartsPerFrame
   /// The bytes are not a HostFrame, an entity id stands twice, or the simulation time exceeds
   /// kMaxSimTimeNs.
   malformed = 4,
@@ -38,6 +38,8 @@ enum class DecodeStatus : std::uint8_t {
   /// A value is NaN, infinite or outside the range that docs/wire.md gives.
   invalid_environment = 13,
   invalid_view = 14,  ///< the field of view is no number, or beyond what any sensor may have
+  /// The drive of a part is no number or out of range, or a part stands twice.
+  invalid_part = 15,
 };
 /// Returns the English name of a status, for messages. RT-safe.
 [[nodiscard]] std::string_view to_string(DecodeStatus status) noexcept;

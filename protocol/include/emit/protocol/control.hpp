@@ -29,6 +29,8 @@ enum class StatusCode : std::uint8_t {
   internal = 12,
   invalid_environment = 13,
   invalid_view = 14,
+  invalid_part = 15,
+  unknown_part = 16,
 };
 
 /// Detail of a `not_allowed` status for a host frame whose run another host has replaced.
@@ -37,8 +39,15 @@ inline constexpr std::uint64_t kDetailOldRun = 1U << 16;
 /// stopped.
 inline constexpr std::uint64_t kDetailStopped = 1U << 17;
 
+/// Returns the detail of an `unknown_part` status.
+[[nodiscard]] constexpr std::uint64_t part_detail(std::uint32_t entity_id,
+                                                  std::uint32_t part_id) noexcept {
+  return std::uint64_t{entity_id} << 32U | part_id;
+}
+
 /// Returns the English text of a status. Thread: any. It allocates.
-/// @param detail  unknown_entity, overloaded: the entity's id; not_allowed: the command's kind or
+/// @param detail  unknown_entity, overloaded: the entity's id; unknown_part: part_detail();
+/// not_allowed: the command's kind or
 ///   kDetailOldRun; ok: the command's kind or kDetailStopped; other codes ignore it.
 [[nodiscard]] std::string status_text(StatusCode code, std::uint64_t detail);
 

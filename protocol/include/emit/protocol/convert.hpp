@@ -13,6 +13,7 @@ class ControlRecord;
 class EntityState;
 class Environment;
 class HostFrame;
+class PartCommand;
 class Pose;
 }  // namespace emit::v1
 
@@ -25,6 +26,7 @@ namespace emit::protocol {
 void to_proto(const physics::Pose& pose, const std::optional<PoseRates>& rates, v1::Pose& out);
 void to_proto(const EntityStateData& entity, v1::EntityState& out);
 void to_proto(const EnvironmentData& environment, v1::Environment& out);
+void to_proto(const PartCommandData& part, v1::PartCommand& out);
 void to_proto(const HostFrameData& frame, v1::HostFrame& out);
 
 /// Reads the struct from the message and checks the values as decode_host_frame() does
@@ -38,6 +40,8 @@ void to_proto(const HostFrameData& frame, v1::HostFrame& out);
                                       DecodeFault* fault = nullptr) noexcept;
 [[nodiscard]] DecodeStatus from_proto(const v1::Environment& in, EnvironmentData& out,
                                       DecodeFault* fault = nullptr) noexcept;
+[[nodiscard]] DecodeStatus from_proto(const v1::PartCommand& in, PartCommandData& out,
+                                      DecodeFault* fault = nullptr) noexcept;
 [[nodiscard]] DecodeStatus from_proto(const v1::HostFrame& in, HostFrameData& out,
                                       DecodeFault* fault = nullptr) noexcept;
 
@@ -49,6 +53,9 @@ void to_proto(const HostFrameData& frame, v1::HostFrame& out);
 /// Checks weather as decode_host_frame() does. RT-safe.
 [[nodiscard]] DecodeStatus check_environment(const EnvironmentData& environment,
                                              DecodeFault* fault = nullptr) noexcept;
+/// Checks the drive of a part as decode_host_frame() does. RT-safe.
+[[nodiscard]] DecodeStatus check_part(const PartCommandData& part,
+                                      DecodeFault* fault = nullptr) noexcept;
 
 /// Appends a record header and the message to `out`, ready for a TCP connection (docs/wire.md
 /// section 2).

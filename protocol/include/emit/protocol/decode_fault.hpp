@@ -12,20 +12,21 @@ enum class DecodeStatus : std::uint8_t;
 /// The field of a host frame that a decoder refused, with its value and range. A plain struct:
 /// filling it allocates nothing.
 struct DecodeFault {
-  enum class Part : std::uint8_t { message, seeker, entity, environment };
+  enum class Part : std::uint8_t { message, seeker, entity, environment, part };
   enum class Kind : std::uint8_t {
     none,          ///< the decoder names no field: the bytes are not a host frame
     out_of_range,  ///< `value` is outside `lowest` to `highest`, or NaN
     missing,       ///< `field` is mandatory
-    repeated,      ///< the entity stands in the frame twice
+    repeated,      ///< the entity or the part stands in the frame twice
   };
   Kind kind = Kind::none;
   Part part = Part::message;
-  std::uint32_t entity_id = 0;  ///< id of the entity, for Part::entity
+  std::uint32_t entity_id = 0;  ///< id of the entity, for Part::entity and Part::part
   const char* field = "";       ///< name as in host.proto, static storage
   double value = 0.0;
   double lowest = 0.0;
   double highest = 0.0;
+  std::uint32_t part_id = 0;  ///< id of the part, for Part::part
 };
 
 /// Length that is enough for every text of the functions below, bytes.

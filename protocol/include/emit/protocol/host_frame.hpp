@@ -43,6 +43,23 @@ struct EnvironmentData {
   std::optional<double> film_w_m2_k;
 };
 
+/// Largest number of commands to parts in one host frame.
+inline constexpr std::size_t kMaxPartsPerFrame = 32;
+
+/// Drive of a part of an entity from a host frame's simulation time on.
+struct PartCommandData {
+  enum class Kind : std::uint8_t {
+    off,
+    temperature,  ///< value: temperature of the skin, K
+    power,        ///< value: power into the skin, W/m2
+    throttle,     ///< value: 0 idle to 1 full
+  };
+  std::uint32_t entity_id = 0;
+  std::uint32_t part_id = 0;
+  Kind kind = Kind::off;
+  double value = 0.0;
+};
+
 /// One host frame.
 struct HostFrameData {
   std::uint64_t frame_number = 0;
@@ -57,12 +74,20 @@ struct HostFrameData {
   /// Yaw, pitch and roll of the detector against the seeker's body, rad; none: unchanged.
   std::optional<glm::dvec3> gimbal_rad;
   std::optional<double> fov_h_rad;  ///< horizontal field of view from here on; none: unchanged
+  std::array<PartCommandData, kMaxPartsPerFrame> parts;
+  std::uint32_t part_count = 0;
 
   /// Returns the entities in use.
   /// @pre entity_count <= kMaxEntitiesPerFrame
   [[nodiscard]] std::span<const EntityStateData> entity_span() const noexcept {
     EMIT_CHECK_OP(entity_count, <=, kMaxEntitiesPerFrame);
     return {entities.data(), entity_count};
+  }
+  /// Returns the commands to parts in use.
+  /// @pre part_count <= kMaxPartsPerFrame
+  [[nodiscard]] std::span<const PartCommandData> part_span() const noexcept {
+    EMIT_CHECK_OP(part_count, <=, kMaxPartsPerFrame);
+    return {parts.data(), part_count};
   }
 };
 

@@ -29,6 +29,8 @@ class StatusCode(enum.IntEnum):
     INTERNAL = 12
     INVALID_ENVIRONMENT = 13
     INVALID_VIEW = 14
+    INVALID_PART = 15
+    UNKNOWN_PART = 16
 
 
 @dataclasses.dataclass(frozen=True)

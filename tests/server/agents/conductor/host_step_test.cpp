@@ -71,6 +71,42 @@ TEST(HostStep, RefusesAFieldOfViewThatTheSensorCannotHaveAndTakesTheRestOfTheFra
   EXPECT_EQ(rig.count(Counter::refused_invalid_view), number);
 }
 
+TEST(HostStep, HandsCommandsToPartsOnWithTheFrameAndRefusesPartsThatAreNot) {
+  using Kind = protocol::PartCommandData::Kind;
+  scene::ScenarioDesc scenario = scenario_with_entity(7);
+  scene::PartDesc engine;
+  engine.id = 3;
+  engine.curve.given = true;
+  scene::PartDesc skin;
+  skin.id = 4;
+  scenario.objects.front().parts = {engine, skin};
+  Rig rig({}, scenario);
+  rig.with([](protocol::HostFrameData& frame) {
+       frame.parts[0] = {7, 3, Kind::throttle, 0.5};
+       frame.parts[1] = {7, 4, Kind::throttle, 0.5};  // takes none
+       frame.parts[2] = {7, 4, Kind::power, 80.0};
+       frame.parts[3] = {8, 3, Kind::off, 0.0};  // no such entity
+       frame.part_count = 4;
+     })
+      .send(1, kMs);
+  rig.settle();
+  rig.send(2, 2 * kMs);
+  rig.settle();
+  ASSERT_EQ(rig.frames.size(), 2U);
+  ASSERT_EQ(rig.script.parts.size(), 2U);
+  EXPECT_EQ(rig.script.parts[0].first, kMs);
+  EXPECT_EQ(rig.script.parts[0].second.part_id, 3U);
+  EXPECT_EQ(rig.script.parts[0].second.command,
+            (scene::PartCommand{scene::PartCommand::Kind::throttle, 0.5}));
+  EXPECT_EQ(rig.script.parts[1].second.command,
+            (scene::PartCommand{scene::PartCommand::Kind::power, 80.0}));
+  ASSERT_EQ(rig.replies.size(), 2U);
+  EXPECT_EQ(rig.replies[0].code, StatusCode::unknown_part);
+  EXPECT_EQ(rig.replies[0].detail, protocol::part_detail(7, 4));
+  EXPECT_EQ(rig.replies[1].detail, protocol::part_detail(8, 3));
+  EXPECT_EQ(rig.count(Counter::refused_unknown_part), 2U);
+}
+
 TEST(HostStep, GivesTheSamePixelsWhateverTheTiming) {
   const auto run = [](bool one_by_one) {
     Rig rig;

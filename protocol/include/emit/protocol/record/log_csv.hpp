@@ -20,12 +20,13 @@ enum class LogTable : std::uint8_t {
   frames,          ///< frames of a journal with flags and the pose of the sensor that they used
   frame_entities,  ///< states of entities as frames used them
   weather,         ///< weather that the host sent
+  parts,           ///< commands to parts of entities that the host sent
   events,          ///< run starts, commands, missing entries, the cut of a crash
 };
-inline constexpr std::size_t kLogTables = 6;
+inline constexpr std::size_t kLogTables = 7;
 /// Names of the tables, in the order of LogTable; a folder holds NAME.csv of each.
 inline constexpr std::array<std::string_view, kLogTables> kLogTableNames{
-    "seeker", "entities", "frames", "frame_entities", "weather", "events"};
+    "seeker", "entities", "frames", "frame_entities", "weather", "parts", "events"};
 
 /// Options of export_log_csv().
 struct LogCsvOptions {

@@ -39,7 +39,9 @@ struct LogCutSummary {
   std::uint64_t left_out_runs = 0;     ///< runs of the same daemon that only_run left out
   std::uint64_t other_messages = 0;    ///< messages of other topics, left out
   std::uint64_t carried_entities = 0;  ///< pose logs: states put into the first frame
+  std::uint64_t carried_parts = 0;     ///< pose logs: commands to parts put into the first frame
   bool carried_weather = false;
+  bool carried_view = false;              ///< pose logs: field of view or gimbals
   std::optional<std::string> truncation;  ///< of the input
 };
 
@@ -48,12 +50,12 @@ struct LogCutSummary {
 /// A journal keeps every entry from the start of the daemon that recorded the run to the last frame
 /// before the first one behind the range: the state of the scene comes from all of them, so that
 /// fewer would replay to other pixels. A pose log keeps the host frames of the range. The first one
-/// takes on the newest weather and the states of entities that earlier frames of the run have set,
-/// as jumps without rates.
+/// takes on the newest weather, field of view, gimbals and commands to parts, and the states of
+/// entities that earlier frames of the run have set, as jumps without rates.
 ///
 /// Errors: those of McapReader; invalid_argument (the range is empty, the output is an input, no or
 /// more than one run has a frame in the range); unsupported (neither journal nor pose log, the run
-/// has no start, entries are missing, the first frame cannot carry all entities).
+/// has no start, entries are missing, the first frame cannot carry all entities or parts).
 [[nodiscard]] physics::Result<LogCutSummary> cut_log(const std::filesystem::path& in,
                                                      const std::filesystem::path& out,
                                                      const LogCutOptions& options);
