@@ -3,7 +3,9 @@
 
 #include <algorithm>
 
+#include "emit/physics/climate.hpp"
 #include "emit/physics/constants.hpp"
+#include "emit/scene/base.hpp"
 #include "overrides.hpp"
 #include "resolve/complete_weather.hpp"
 #include "resolve/resolve.hpp"
@@ -45,6 +47,13 @@ void report_file_error(const physics::Error& error, const Node& table, std::stri
 
 namespace {
 
+/// History of foster with `cached` without thermal.history_start_s: shade of 3.5 days, in steps
+/// that grow into the past.
+constexpr std::int64_t kShadedHistoryNs = 302'400'000'000'000;
+constexpr std::uint32_t kShadedHistorySteps = 64;
+/// History otherwise: the paper's 3.5 hours. Each step of `per-frame` costs a shadow map per frame.
+constexpr std::int64_t kShortHistoryNs = 12'600'000'000'000;
+
 /// Keys of [weather] beside `file` and `sample`: parameters of the clear-sky models.
 bool is_clear_sky_key(std::string_view key) {
   return key != "file" && key != "sample" &&
@@ -81,12 +90,36 @@ Result<std::vector<scene::WeatherSample>> load_weather(const std::filesystem::pa
   return weather_of_year(*year, file.string(), scenario, scenario.warnings);
 }
 
+/// Fills the parameters of the clear-sky models that the scenario does not state from place and
+/// date, and says so.
+void take_climate(const Node& table, physics::ClearSky& sky, ScenarioDesc& scenario) {
+  const physics::GeoPlace place{physics::Radians(scenario.place.lat_rad),
+                                physics::Radians(scenario.place.lon_rad),
+                                physics::Metres(scenario.place.height_m)};
+  std::string taken;
+  const auto take = [&](std::string_view key, double& value, double climate) {
+    if (table.has(key)) return;
+    value = climate;
+    taken += fmt::format("{}weather.{} = {:.1f}", taken.empty() ? "" : ", ", key, value);
+  };
+  take("air_mean_k", sky.air_mean_k,
+       physics::zonal_climate(place).at_k(physics::day_of_year(scenario.epoch_utc_ns)));
+  take("dew_point_k", sky.dew_point_k, physics::usual_dew_point_k(sky.air_mean_k));
+  if (taken.empty()) return;
+  scenario.warnings.push_back(
+      fmt::format("{}: the weather is not stated in full: place and date give {}",
+                  scenario.file.string(), taken));
+}
+
 /// Reads the weather. The thermal options say how far back it has to reach.
 void resolve_weather(const Node& root, ScenarioDesc& scenario, Diagnostics& diagnostics) {
   const Node& table = section(root, "weather", diagnostics);
   WeatherDraft draft;
   const std::size_t faults = diagnostics.size();
   read_table(table, weather_keys(), draft, diagnostics);
+  if (draft.file.empty() && !table.has("sample") && diagnostics.size() == faults) {
+    take_climate(table, draft.clear_sky, scenario);
+  }
   scenario.clear_sky = draft.clear_sky;
   const bool has_file = !draft.file.empty();
   const bool has_samples = table.has("sample");
@@ -161,6 +194,24 @@ void resolve_head(const Node& root, ScenarioDesc& scenario, ScenarioHead& head,
   read_table(root, scenario_head_keys(), head, diagnostics, section_names(), place_of_daemon_key);
   scenario.name = head.name;
   scenario.epoch_utc_ns = head.epoch_utc_ns;
+}
+
+/// Chooses start, steps and spin-up of the history where the scenario leaves them open. The
+/// extended model on samples has a history of shade that is long enough to need no spin-up
+/// without it.
+void complete_history(const Node& thermal, scene::ThermalOptions& options) {
+  const bool start_stated = thermal.has("history_start_s");
+  const bool extended = options.model == scene::ThermalModel::foster;
+  const bool shaded = extended && options.method == scene::ThermalMethod::cached && !start_stated &&
+                      !thermal.has("steps");
+  if (shaded) {
+    options.history_start_ns = -kShadedHistoryNs;
+    options.steps = kShadedHistorySteps;
+    if (!thermal.has("spacing")) options.spacing = scene::StepSpacing::geometric;
+  } else if (!start_stated) {
+    options.history_start_ns = -kShortHistoryNs;
+  }
+  if (!thermal.has("spin_up_s") && (shaded || !extended)) options.spin_up_ns = 0;
 }
 
 void check_surroundings(const Node& thermal, const ScenarioDesc& scenario,
@@ -258,10 +309,9 @@ Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
   const Node& thermal = section(root, "thermal", diagnostics);
   scenario.thermal = default_thermal();
   read_table(thermal, thermal_keys(), scenario.thermal, diagnostics);
-  if (scenario.thermal.model != scene::ThermalModel::foster && !thermal.has("spin_up_s")) {
-    scenario.thermal.spin_up_ns = 0;
-  }
+  complete_history(thermal, scenario.thermal);
   resolve_weather(root, scenario, diagnostics);
+  if (!thermal.has("initial_k")) scenario.thermal.initial_k = scene::mean_air_k(scenario);
   resolve_display(root, scenario, diagnostics);
 
   const std::vector<scene::SpectralBand> declared = resolve_declared_bands(root, diagnostics);
@@ -281,6 +331,7 @@ Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
       return std::find(handed_over.begin(), handed_over.end(), entry.band) == handed_over.end();
     });
   }
+  scene::resolve_bases(scenario);
   resolve_default_material(root, head, scenario, diagnostics);
   check_surroundings(thermal, scenario, diagnostics);
   scenario.sensor = resolve_sensor(root, diagnostics);

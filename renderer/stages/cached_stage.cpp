@@ -79,13 +79,14 @@ RefineView refine_view(const scene::SensorDesc& sensor, const FrameRequest& requ
   return view;
 }
 
-/// Directions to the sun from the start of the history to the end of the camera's trajectory, or
-/// over a day when the camera has no trajectory. Instants without sun are left out.
+/// Directions to the sun over the last day of history and camera trajectory, from the start of the
+/// history on, or over a day when the camera has no trajectory. Instants without sun are left out.
 std::vector<glm::vec3> suns(const scene::ScenarioDesc& scenario, const Environment& environment) {
-  const std::int64_t begin_ns = scenario.thermal.history_start_ns;
+  const std::int64_t start_ns = scenario.thermal.history_start_ns;
   const scene::Trajectory& keys = scenario.sensor.trajectory;
   const std::int64_t end_ns =
-      keys.size() < 2 ? begin_ns + kDayNs : keys[keys.size() - 1].sim_time_ns;
+      keys.size() < 2 ? start_ns + kDayNs : keys[keys.size() - 1].sim_time_ns;
+  const std::int64_t begin_ns = std::max(start_ns, end_ns - kDayNs);
   std::vector<glm::vec3> out;
   for (std::size_t i = 0; i <= kSuns; ++i) {
     const auto way = static_cast<double>(end_ns - begin_ns) * static_cast<double>(i) / kSuns;

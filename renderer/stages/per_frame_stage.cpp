@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "stages/per_frame_stage.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <string>
+#include <vector>
 
 #include "emit/physics/constants.hpp"
+#include "emit/scene/sheets.hpp"
 #include "stages/band_model.hpp"
 
 namespace emit::renderer {
@@ -21,6 +26,26 @@ gl::Buffer make_tap_buffer(const scene::ThermalOptions& options) {
   return gl::Buffer(sizeof(taps), &taps, 0);
 }
 
+/// Refuses sheets with the extended model: their temperature follows from what both faces receive,
+/// of which a pixel knows one.
+physics::Result<void> check_no_sheets(const scene::ScenarioDesc& scenario,
+                                      const scene::SceneGeometry& geometry) {
+  if (scenario.thermal.model != scene::ThermalModel::foster) return {};
+  const std::vector<std::uint32_t> sheets = scene::materials_of_sheets(geometry);
+  if (sheets.empty()) return {};
+  std::string names;
+  for (const std::uint32_t m : sheets) {
+    names += fmt::format("{}'{}'", names.empty() ? "" : ", ", geometry.materials[m].name);
+  }
+  return physics::make_error(
+      physics::ErrorCode::config,
+      fmt::format(
+          "{}: thin double-sided faces of {} are sheets, whose two sides share a "
+          "temperature. thermal.method = \"per-frame\" does not compute that with the model "
+          "foster: use \"cached\", or make the faces single-sided",
+          scenario.file.string(), names));
+}
+
 /// Material table of the shaders for either thermal model.
 std::vector<gpu::MaterialParams> make_material_params(const scene::ScenarioDesc& scenario,
                                                       std::span<const scene::Material> materials,
@@ -36,6 +61,9 @@ std::vector<gpu::MaterialParams> make_material_params(const scene::ScenarioDesc&
 physics::Result<std::unique_ptr<ThermalStage>> PerFrameStage::create(
     const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
     std::vector<FosterMaterial> foster_materials, const SceneHistory& history) {
+  if (auto checked = check_no_sheets(scenario, geometry); !checked) {
+    return tl::unexpected(std::move(checked.error()));
+  }
   const std::uint32_t width_px = scenario.sensor.width_px;
   const std::uint32_t height_px = scenario.sensor.height_px;
   auto occlusion = OcclusionPass::create(width_px, height_px);

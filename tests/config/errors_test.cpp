@@ -255,7 +255,11 @@ const std::vector<Case>& cases() {
       {"material_without_layers", material("base_k = 290\n"),
        "s.toml:2:1: key 'layers' is missing (material 'x' has no prescribed_k)"},
       {"material_without_base", material(kLayer),
-       "s.toml:2:1: key 'base_k' is missing (material 'x' has no prescribed_k)"},
+       "s.toml:2:1: key 'base' is missing (material 'x' has neither base_k nor prescribed_k)"},
+      {"room_without_temperature", material("base = \"room\"\n" + kLayer),
+       "s.toml:6:8: 'base' is room: key 'base_k' is missing, which states its temperature"},
+      {"unknown_base", material("base = \"cellar\"\n" + kLayer),
+       "s.toml:6:8: 'base' is 'cellar', must be one of: ground, air, room, body"},
       {"material_without_name",
        "[[material]]\nsolar_absorptance_frac = 0.5\nemissivity_frac = "
        "0.9\nprescribed_k = 400\n",
@@ -268,8 +272,8 @@ const std::vector<Case>& cases() {
        "s.toml:7:27: 'thickness_m' is 0, must be > 0, <= 100"},
       {"material_twice", material("prescribed_k = 400\n") + material("prescribed_k = 400\n"),
        "s.toml:8:8: material 'x' is already defined at s.toml:2:1"},
-      {"dew_point", "[weather]\ndew_point_k = 310\n",
-       "s.toml:3:15: 'dew_point_k' (310) is above the warmest air (296)"},
+      {"dew_point", "[weather]\nair_mean_k = 290\ndew_point_k = 310\n",
+       "s.toml:4:15: 'dew_point_k' (310) is above the warmest air (296)"},
       {"weather_descends",
        "[[weather.sample]]\ntime_s = 5\ndni_w_m2 = 0\ndhi_w_m2 = 0\nlongwave_down_w_m2 = "
        "300\nair_k "

@@ -320,11 +320,15 @@ TEST_F(ConfigTest, every_scenario_key_reaches_its_field) {
   EXPECT_TRUE(s.materials[1].dry_layers_valid);
 }
 
-TEST_F(ConfigTest, foster_is_the_default_and_spins_up_for_two_days) {
+TEST_F(ConfigTest, foster_is_the_default_and_a_short_history_spins_up_for_two_days) {
   const std::string object = "[[object]]\ngltf = \"a.glb\"\n";
   EXPECT_EQ(scenario(object)->thermal.model, scene::ThermalModel::foster);
-  EXPECT_EQ(scenario(object)->thermal.spin_up_ns, 172'800'000'000'000);
-  EXPECT_EQ(scenario(object, {"thermal.model=emit2014"})->thermal.spin_up_ns, 0);
+  for (const char* const history :
+       {"thermal.history_start_s=0", "thermal.steps=27", "thermal.method=per-frame"}) {
+    SCOPED_TRACE(history);
+    EXPECT_EQ(scenario(object, {history})->thermal.spin_up_ns, 172'800'000'000'000);
+    EXPECT_EQ(scenario(object, {history, "thermal.model=emit2014"})->thermal.spin_up_ns, 0);
+  }
   const auto none = scenario(object, {"thermal.model=foster", "thermal.spin_up_s=0"});
   EXPECT_EQ(none->thermal.spin_up_ns, 0);
 }
@@ -394,7 +398,8 @@ TEST_F(ConfigTest, a_printed_weather_table_loads_to_the_same_values) {
   write("w.csv",
         "time_s,dni_w_m2,dhi_w_m2,longwave_down_w_m2,air_k,wind_m_s,cloud_frac,environment_k,"
         "film_w_m2_k\n0.1,800.7,100,330,290.15,2,0,,\n60,0,1,2,300,3,0.5,280.3,13.3\n");
-  const auto first = scenario("[weather]\nfile = \"w.csv\"\n[thermal]\nspin_up_s = 0\n");
+  const auto first =
+      scenario("[weather]\nfile = \"w.csv\"\n[thermal]\nhistory_start_s = 0\nspin_up_s = 0\n");
   ASSERT_TRUE(first.has_value()) << first.error().text;
   const std::string printed = print_scenario(*first);
   const auto second = load_scenario(write("printed.toml", printed), {}, options_);

@@ -176,10 +176,12 @@ TEST_F(ConfigTest, a_scenario_without_place_or_time_warns_of_the_defaults_it_tak
               ::testing::ElementsAre(
                   AllOf(HasSubstr("s.toml: 'epoch_utc' is not given"), HasSubstr("2014-06-21T10")),
                   AllOf(HasSubstr("'place.lat_deg' is not given"), HasSubstr("48.56 is taken")),
-                  AllOf(HasSubstr("'place.lon_deg' is not given"), HasSubstr("11.26 is taken"))));
+                  AllOf(HasSubstr("'place.lon_deg' is not given"), HasSubstr("11.26 is taken")),
+                  HasSubstr("place and date give weather.air_mean_k = ")));
   // Values from the command line count as given.
   const auto given =
-      scenario("epoch_utc = 2014-06-21T06:00:00Z\n[place]\nlat_deg = 10\n", {{"place.lon_deg=20"}});
+      scenario("epoch_utc = 2014-06-21T06:00:00Z\n[place]\nlat_deg = 10\n",
+               {{"place.lon_deg=20"}, {"weather.air_mean_k=300"}, {"weather.dew_point_k=290"}});
   ASSERT_TRUE(given.has_value()) << given.error().text;
   EXPECT_THAT(given->warnings, ::testing::IsEmpty());
 }

@@ -17,8 +17,10 @@ TEST_F(ConfigTest, weather_is_read_with_columns_in_any_order) {
   write("w.csv",
         "# measured\r\nair_k, time_s,dni_w_m2,dhi_w_m2,longwave_down_w_m2,wind_m_s,cloud_frac,"
         "environment_k\r\n290,0,800,100,330,2,0,\r\n\r\n291.5,60.5,810,101,331,2.5,0.1,288\r\n");
-  const auto loaded = scenario("epoch_utc = 2014-06-21T06:00:00Z\n" + std::string(kWeather) +
-                               "[place]\nlat_deg = 48\nlon_deg = 11\n[thermal]\nspin_up_s = 0\n");
+  const auto loaded =
+      scenario("epoch_utc = 2014-06-21T06:00:00Z\n" + std::string(kWeather) +
+               "[place]\nlat_deg = 48\nlon_deg = 11\n[thermal]\nhistory_start_s = 0\n"
+               "spin_up_s = 0\n");
   ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
   EXPECT_THAT(loaded->warnings, ::testing::IsEmpty());
   ASSERT_EQ(loaded->weather.size(), 2U);

@@ -21,6 +21,8 @@ constexpr const char* kHeader =
     "time_s,dni_w_m2,dhi_w_m2,longwave_down_w_m2,air_k,wind_m_s,cloud_frac\n";
 constexpr const char* kFile =
     "[place]\nlat_deg = 48.56\nlon_deg = 11.26\n[weather]\nfile = \"w.csv\"\n";
+/// A simulation that begins two days before the history.
+constexpr const char* kShort = "[thermal]\nhistory_start_s = 0\n";
 constexpr const char* kMidnight = "epoch_utc = 2014-06-21T00:00:00Z\n";
 
 /// Weather of a clear day by the models themselves, hourly, at the default place.
@@ -45,7 +47,7 @@ std::string clear_day(double from_h, double to_h, const physics::ClearSky& model
 
 class Weather : public ConfigTest {
  protected:
-  scene::ScenarioDesc load(const std::string& csv, const std::string& more = "") {
+  scene::ScenarioDesc load(const std::string& csv, const std::string& more = kShort) {
     write("w.csv", csv);
     auto loaded = scenario(kMidnight + std::string(kFile) + more);
     EXPECT_TRUE(loaded.has_value()) << loaded.error().text;
@@ -126,14 +128,16 @@ TEST_F(Weather, a_completed_table_prints_and_loads_to_the_same_values) {
 }
 
 TEST_F(Weather, stated_parameters_of_the_models_hold) {
-  const auto loaded = load(clear_day(0, 24, {}), "wind_m_s = 9\nair_mean_k = 280\n");
+  const auto loaded =
+      load(clear_day(0, 24, {}), "wind_m_s = 9\nair_mean_k = 280\n" + std::string(kShort));
   EXPECT_EQ(loaded.clear_sky.wind_m_s, 9.0);
   EXPECT_EQ(loaded.clear_sky.air_mean_k, 280.0);
   EXPECT_EQ(loaded.weather.front().wind_m_s, 9.0);
 }
 
 TEST_F(Weather, the_published_model_needs_no_more_than_the_history) {
-  const auto loaded = load(clear_day(0, 24, {}), "[thermal]\nmodel = \"emit2014\"\n");
+  const auto loaded =
+      load(clear_day(0, 24, {}), "[thermal]\nmodel = \"emit2014\"\nhistory_start_s = 0\n");
   EXPECT_EQ(loaded.weather.size(), 25U);
   EXPECT_THAT(loaded.warnings, IsEmpty());
   const auto late =

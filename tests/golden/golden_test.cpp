@@ -64,14 +64,23 @@ void compare(const image::ExrImage& image, const image::ExrImage& reference, con
 TEST_P(Golden, matches_the_stored_image) {
   const Case& param = GetParam();
   // Everything that the images depend on and that scenarios leave to the defaults.
-  const std::vector<std::string> overrides = {
-      "sensor.width_px=320",       "sensor.height_px=256",
-      "thermal.model=emit2014",    std::string("thermal.method=") + param.method,
-      "thermal.history_start_s=0", "thermal.steps=13",
-      "thermal.spacing=uniform",   "thermal.first_step_s=20",
-      "thermal.tolerance_k=0.1",   "thermal.shadow_map_px=1024",
-      "thermal.max_cascades=1",    "thermal.blocker_taps=8",
-      "thermal.filter_taps=32",    "thermal.max_samples=1000000"};
+  const std::vector<std::string> overrides = {"sensor.width_px=320",
+                                              "sensor.height_px=256",
+                                              "thermal.model=emit2014",
+                                              std::string("thermal.method=") + param.method,
+                                              "thermal.history_start_s=0",
+                                              "thermal.steps=13",
+                                              "thermal.spacing=uniform",
+                                              "thermal.first_step_s=20",
+                                              "thermal.tolerance_k=0.1",
+                                              "thermal.shadow_map_px=1024",
+                                              "thermal.max_cascades=1",
+                                              "thermal.blocker_taps=8",
+                                              "thermal.filter_taps=32",
+                                              "thermal.max_samples=1000000",
+                                              "material[asphalt].base_k=293.15",
+                                              "material[concrete].base_k=293.15",
+                                              "material[stone].base_k=293.15"};
   auto scenario = config::load_scenario(std::filesystem::path(EMIT_TEST_SHARE_DIR) / "scenarios" /
                                             (std::string(param.scenario) + ".toml"),
                                         overrides);

@@ -30,6 +30,7 @@ struct KeySpec {
   std::string range;
   std::string meaning;
   bool required = false;
+  bool open_default = false;  ///< the loader chooses the value where the key is absent
 };
 
 /// Interval of a number. It also makes the text for messages and documentation.
@@ -329,6 +330,13 @@ Key<T> written_if(Present present, Key<T> key) {
     }
     return inner(in);
   };
+  return key;
+}
+
+/// Key whose value the loader chooses where it is absent; its meaning says how.
+template <class T>
+Key<T> open_default(Key<T> key) {
+  key.spec.open_default = true;
   return key;
 }
 

@@ -150,8 +150,10 @@ SectionDoc section_doc(std::string path, bool array, std::string summary, const 
                        const T& defaults) {
   SectionDoc doc{std::move(path), array, std::move(summary), {}};
   for (const Key<T>& key : keys) {
-    doc.rows.push_back(
-        {key.spec, key.spec.required ? std::string("required") : key.write(defaults).value_or("")});
+    std::string text = key.spec.required       ? std::string("required")
+                       : key.spec.open_default ? std::string()
+                                               : key.write(defaults).value_or("");
+    doc.rows.push_back({key.spec, std::move(text)});
   }
   return doc;
 }

@@ -5,6 +5,7 @@
 /// Keys of materials, in scenarios and in library files.
 namespace emit::config {
 
+using scene::BaseKind;
 using scene::FosterFit;
 using scene::FosterMode;
 using scene::Layer;
@@ -92,7 +93,7 @@ Key<Material> band_emissivity_key() {
 Key<Material> layers_key() {
   return custom<Material>(
       {"layers", "array of tables", "", "1 .. 16",
-       "Layers from the outside down to where the temperature is `base_k`. emit2014 uses the "
+       "Layers from the outside down to `base`. emit2014 uses the "
        "first. Required without `prescribed_k`. See `layers` below.",
        false},
       [](Material& out, const Node& node, Diagnostics& diagnostics) {
@@ -185,6 +186,19 @@ Key<Material> foster_fit_key() {
       });
 }
 
+Key<Material> base_k_key() {
+  Key<Material> key = number<Material>(
+      "base_k", "K", between(150, 2000), EMIT_FIELD(base_k),
+      "Temperature under the last layer. It wins over what `base` gives. Without `base` it is "
+      "required, unless there is `prescribed_k`.");
+  key.read = [inner = std::move(key.read)](Material& out, const Node& node,
+                                           Diagnostics& diagnostics) {
+    inner(out, node, diagnostics);
+    out.base_stated = true;
+  };
+  return written_if([](const Material& in) { return in.base_stated; }, std::move(key));
+}
+
 }  // namespace
 
 const KeyTable<Material>& material_keys() {
@@ -198,10 +212,18 @@ const KeyTable<Material>& material_keys() {
                                 "Total hemispherical emissivity in the long-wave infrared.")),
       band_emissivity_key(),
       layers_key(),
-      written_if([](const Material& in) { return in.base_k > 0.0; },
-                 number<Material>(
-                     "base_k", "K", between(150, 2000), EMIT_FIELD(base_k),
-                     "Core temperature under the last layer. Required without `prescribed_k`.")),
+      written_if([](const Material& in) { return !in.layers.empty(); },
+                 choice<Material>(
+                     "base",
+                     std::vector<std::pair<std::string, BaseKind>>{{"ground", BaseKind::ground},
+                                                                   {"air", BaseKind::air},
+                                                                   {"room", BaseKind::room},
+                                                                   {"body", BaseKind::body}},
+                     EMIT_FIELD(base),
+                     "What the last layer rests on: ground at that depth, outdoor air, a room of "
+                     "`base_k`, "
+                     "or the interior of a vehicle. See Bases.")),
+      base_k_key(),
       number<Material>("core_conductance_w_m2_k", "W m-2 K-1", above_to(0, 1e7),
                        EMIT_FIELD(core_conductance_w_m2_k),
                        "emit2014: conductance between surface and core, for sheets. Without it "

@@ -127,15 +127,17 @@ const KeyTable<WeatherDraft>& weather_keys() {
       number<WeatherDraft>("linke_turbidity", "", between(1, 10),
                            EMIT_FIELD(clear_sky.linke_turbidity),
                            "Clear-sky models: Linke turbidity of the Ineichen model."),
-      number<WeatherDraft>("air_mean_k", "K", between(limits::kAirK),
-                           EMIT_FIELD(clear_sky.air_mean_k),
-                           "Clear-sky models: daily mean of the air temperature."),
+      open_default(number<WeatherDraft>(
+          "air_mean_k", "K", between(limits::kAirK), EMIT_FIELD(clear_sky.air_mean_k),
+          "Clear-sky models: daily mean of the air temperature. Without it that of "
+          "the latitude, the height and the date.")),
       number<WeatherDraft>(
           "air_amplitude_k", "K", between(0, 40), EMIT_FIELD(clear_sky.air_amplitude_k),
           "Clear-sky models: amplitude of the daily cosine, which is warmest at 15:00 solar time."),
-      number<WeatherDraft>(
+      open_default(number<WeatherDraft>(
           "dew_point_k", "K", between(180, 320), EMIT_FIELD(clear_sky.dew_point_k),
-          "Clear-sky models: dew point. It gives the long-wave emissivity of the sky."),
+          "Clear-sky models: dew point. It gives the long-wave emissivity of the sky. Without it "
+          "that of 60 % relative humidity.")),
       number<WeatherDraft>("wind_m_s", "m s-1", between(limits::kWindMS),
                            EMIT_FIELD(clear_sky.wind_m_s), "Clear-sky models: wind speed."),
       number<WeatherDraft>("cloud_frac", "", between(limits::kCloudFrac),
@@ -358,18 +360,19 @@ const KeyTable<ThermalOptions>& thermal_keys() {
           "tolerance_k", "K", above_to(0, 50), EMIT_FIELD(tolerance_k),
           "Error of surface temperatures to aim at. foster splits history steps for it, cached "
           "refines surfaces for it. per-frame with emit2014 does not use it."),
-      number<ThermalOptions>("initial_k", "K", between(150, 1000), EMIT_FIELD(initial_k),
-                             "Temperature of surfaces at the start: of the spin-up with foster, of "
-                             "the history with emit2014."),
-      nanoseconds<ThermalOptions>("history_start_s", "s", 1e9,
-                                  between(-limits::kMaxSimTimeS, limits::kMaxSimTimeS),
-                                  EMIT_FIELD(history_start_ns),
-                                  "Simulation time from which shadows act on surfaces. It should "
-                                  "lie some hours before the first frame."),
-      nanoseconds<ThermalOptions>(
+      open_default(number<ThermalOptions>(
+          "initial_k", "K", between(150, 1000), EMIT_FIELD(initial_k),
+          "Temperature of surfaces at the start: of the spin-up with foster, "
+          "of the history with emit2014. Without it the daily mean of the "
+          "air.")),
+      open_default(nanoseconds<ThermalOptions>(
+          "history_start_s", "s", 1e9, between(-limits::kMaxSimTimeS, limits::kMaxSimTimeS),
+          EMIT_FIELD(history_start_ns),
+          "Simulation time from which shadows act on surfaces. Without it: see Thermal history.")),
+      open_default(nanoseconds<ThermalOptions>(
           "spin_up_s", "s", 1e9, between(0, 3.2e7), EMIT_FIELD(spin_up_ns),
-          "foster: time of weather without shadows before the history. Clear-sky models make what "
-          "a weather table lacks of it. emit2014 does not use it."),
+          "foster: time of weather without shadows before the history. Without it: see Thermal "
+          "history.")),
       text<ThermalOptions>("surroundings_material", EMIT_FIELD(surroundings_material),
                            "foster: material of the surroundings where the weather states no "
                            "`environment_k`. Without it `default_material` counts."),

@@ -46,12 +46,20 @@ void check_material(const Material& material, const Node& node,
     diagnostics.add(key_location(node, "name"), "'name' is empty");
   }
   if (!material.prescribed_k) {
-    for (const std::string_view key : {"layers", "base_k"}) {
-      if (!node.has(key)) {
-        diagnostics.add(node.at,
-                        fmt::format("key '{}' is missing (material '{}' has no prescribed_k)", key,
-                                    material.name));
-      }
+    if (!node.has("layers")) {
+      diagnostics.add(node.at, fmt::format("key 'layers' is missing (material '{}' has no "
+                                           "prescribed_k)",
+                                           material.name));
+    }
+    if (!node.has("base") && !node.has("base_k")) {
+      diagnostics.add(node.at,
+                      fmt::format("key 'base' is missing (material '{}' has neither base_k "
+                                  "nor prescribed_k)",
+                                  material.name));
+    } else if (const Node* base = node.find("base");
+               base != nullptr && base->text == "room" && !node.has("base_k")) {
+      diagnostics.add(key_location(node, "base"),
+                      "'base' is room: key 'base_k' is missing, which states its temperature");
     }
     if (const Node* layers = node.find("layers");
         layers != nullptr && layers->kind == Node::Kind::array && layers->items.empty()) {

@@ -8,6 +8,7 @@
 
 #include "emit/physics/check.hpp"
 #include "emit/physics/nearest_name.hpp"
+#include "emit/scene/base.hpp"
 
 namespace emit::scene {
 
@@ -21,7 +22,7 @@ Material builtin_default_material() {
   material.solar_absorptance_frac = 0.6;
   material.emissivity_frac = 0.9;
   material.layers = {{0.10, 1.28, 2200.0, 920.0}};
-  material.base_k = 290.0;
+  material.base = BaseKind::air;
   material.modes = {{141.0, 0.324}, {2634.0, 0.676}};
   material.source = "built in: 10 cm of concrete";
   material.uncertainty = "stands in for an unknown material";
@@ -48,6 +49,7 @@ Result<MaterialLookup> MaterialLookup::create(const ScenarioDesc& scenario) {
   if (scenario.default_material.empty()) {
     lookup.default_position_ = lookup.library_.size();
     lookup.library_.push_back(builtin_default_material());
+    lookup.library_.back().base_k = base_temperature_k(lookup.library_.back(), scenario);
   } else if (!lookup.find(scenario.default_material, lookup.default_position_)) {
     return make_error(ErrorCode::config,
                       fmt::format("{}: default_material '{}' is not in the material library{}",

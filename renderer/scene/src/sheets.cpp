@@ -2,9 +2,7 @@
 #include "emit/scene/sheets.hpp"
 
 #include <algorithm>
-#include <cstdint>
 #include <map>
-#include <utility>
 
 namespace emit::scene {
 namespace {
@@ -54,38 +52,39 @@ bool may_have_sheets(const Mesh& mesh) {
   return !is_closed_surface(without_flags);
 }
 
-void adopt_sheets(SceneGeometry& geometry) {
-  std::map<std::uint32_t, std::uint32_t> sheets;  // material -> its sheet
-  const std::size_t materials = geometry.materials.size();
-  for (std::uint32_t m = 0; m < materials; ++m) {
-    if (auto sheet = sheet_of(geometry.materials[m])) {
-      sheets.emplace(m, static_cast<std::uint32_t>(materials + sheets.size()));
-      geometry.materials.push_back(std::move(*sheet));
+std::vector<std::uint32_t> materials_of_sheets(const SceneGeometry& geometry) {
+  std::vector<char> thin(geometry.materials.size());
+  for (std::size_t m = 0; m < thin.size(); ++m) {
+    thin[m] = sheet_of(geometry.materials[m]).has_value() ? 1 : 0;
+  }
+  std::vector<std::uint32_t> found;
+  for (const Mesh& mesh : geometry.meshes) {
+    const auto is_thin = [&](const Submesh& s) { return s.double_sided && thin[s.material] != 0; };
+    if (std::ranges::none_of(mesh.submeshes, is_thin) || !may_have_sheets(mesh)) continue;
+    for (const Submesh& submesh : mesh.submeshes) {
+      if (is_thin(submesh)) found.push_back(submesh.material);
     }
   }
-  std::vector<char> used(geometry.materials.size(), 0);
+  std::ranges::sort(found);
+  found.erase(std::ranges::unique(found).begin(), found.end());
+  return found;
+}
+
+void adopt_sheets(SceneGeometry& geometry) {
+  // Append the material of a sheet for each material that has some.
+  std::map<std::uint32_t, std::uint32_t> sheets;  // material -> its sheet
+  for (const std::uint32_t m : materials_of_sheets(geometry)) {
+    sheets.emplace(m, static_cast<std::uint32_t>(geometry.materials.size()));
+    geometry.materials.push_back(*sheet_of(geometry.materials[m]));
+  }
   for (Mesh& mesh : geometry.meshes) {
     const auto thin = [&](const Submesh& s) {
-      return s.double_sided && s.material < materials && sheets.contains(s.material);
+      return s.double_sided && sheets.contains(s.material);
     };
     if (std::ranges::none_of(mesh.submeshes, thin) || !may_have_sheets(mesh)) continue;
     for (Submesh& submesh : mesh.submeshes) {
       if (thin(submesh)) submesh.material = sheets.at(submesh.material);
-      used[submesh.material] = 1;
     }
-  }
-  // Keep only the sheets that are in use.
-  std::vector<std::uint32_t> renumbered(geometry.materials.size());
-  std::uint32_t next = 0;
-  for (std::uint32_t m = 0; m < geometry.materials.size(); ++m) {
-    renumbered[m] = next;
-    if (m >= materials && used[m] == 0) continue;
-    if (next != m) geometry.materials[next] = std::move(geometry.materials[m]);
-    ++next;
-  }
-  geometry.materials.resize(next);
-  for (Mesh& mesh : geometry.meshes) {
-    for (Submesh& submesh : mesh.submeshes) submesh.material = renumbered[submesh.material];
   }
 }
 

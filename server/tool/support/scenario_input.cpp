@@ -117,8 +117,9 @@ TrajectorySample sample_trajectory(const scene::Trajectory& trajectory, std::int
 }
 
 std::int64_t trajectory_start_ns(const scene::ScenarioDesc& scenario) noexcept {
-  return scenario.sensor.trajectory.empty() ? scenario.thermal.history_start_ns
-                                            : scenario.sensor.trajectory.front().sim_time_ns;
+  return scenario.sensor.trajectory.empty()
+             ? std::max<std::int64_t>(scenario.thermal.history_start_ns, 0)
+             : scenario.sensor.trajectory.front().sim_time_ns;
 }
 
 std::int64_t observation_ns(const scene::ScenarioDesc& scenario) noexcept {

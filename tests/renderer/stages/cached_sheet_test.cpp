@@ -99,6 +99,24 @@ double balance_k(const scene::ScenarioDesc& s, std::int64_t end_ns) {
   return t_k;
 }
 
+TEST(RendererSheet, IsRefusedByNamePerFrameWithTheExtendedModelAlone) {
+  auto scenario = plate(true, scene::ThermalModel::foster);
+  scenario.thermal.method = scene::ThermalMethod::per_frame;
+  const auto refused = renderer::Renderer::create(scenario, {}, {});
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().code, physics::ErrorCode::config);
+  EXPECT_NE(refused.error().text.find("'" + scenario.materials[0].name + "' are sheets"),
+            std::string::npos)
+      << refused.error().text;
+  // One-sided faces, thick ones and the published model have no such sheets.
+  auto thick = scenario;
+  thick.materials[0].layers = {{0.3, 1.0, 2000.0, 900.0}};
+  EXPECT_TRUE(renderer::Renderer::create(thick, {}, {}).has_value());
+  scenario.thermal.model = scene::ThermalModel::emit2014;
+  scenario.thermal.spin_up_ns = 0;
+  EXPECT_TRUE(renderer::Renderer::create(scenario, {}, {}).has_value());
+}
+
 TEST(RendererSheet, HasTheTemperatureOfABodyBetweenTwoFaces) {
   for (const bool faces_up : {true, false}) {
     const auto scenario = plate(faces_up, scene::ThermalModel::foster);

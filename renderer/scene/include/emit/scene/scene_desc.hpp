@@ -65,6 +65,14 @@ struct BandEmissivity {
   double emissivity_frac = 0.0;
 };
 
+/// Kind of base: what the last layer of a material rests on. Material::base_k follows from it.
+enum class BaseKind : std::uint8_t {
+  ground,  ///< ground at the depth of the layers: annual wave of the air at place and date
+  air,     ///< outdoor air, its mean over a day
+  room,    ///< a heated room, a cooled tank or a core: a stated temperature
+  body,    ///< interior of a vehicle, which follows the outdoor air
+};
+
 /// Thermal and optical properties of a surface and of the body under it.
 struct Material {
   std::string name;
@@ -72,7 +80,10 @@ struct Material {
   double emissivity_frac = 0.0;                 ///< total hemispherical, long-wave
   std::vector<BandEmissivity> band_emissivity;  ///< bands not listed use emissivity_frac
   std::vector<Layer> layers;                    ///< outermost first; emit2014 uses the first only
-  double base_k = 0.0;                          ///< core temperature under the last layer
+  BaseKind base = BaseKind::room;               ///< what the last layer rests on
+  /// Temperature under the last layer. resolve_bases() fills it unless the user states it.
+  double base_k = 0.0;
+  bool base_stated = false;  ///< base_k is the user's own number
   /// emit2014: conductance between surface and core. When absent, the first layer's counts.
   std::optional<double> core_conductance_w_m2_k;
   std::optional<double> initial_k;    ///< surface at history start; else thermal.initial_k

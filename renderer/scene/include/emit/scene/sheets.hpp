@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "emit/scene/mesh.hpp"
 
@@ -31,6 +33,10 @@ inline constexpr double kMaxGasKgM3 = 10.0;
 
 /// True where the mesh has double-sided faces and is not the surface of a closed body.
 [[nodiscard]] bool may_have_sheets(const Mesh& mesh);
+
+/// Returns the materials that some sheet of the scene is made of, ascending: double-sided faces of
+/// thin materials that no closed body has. Setup only.
+[[nodiscard]] std::vector<std::uint32_t> materials_of_sheets(const SceneGeometry& geometry);
 
 /// Gives double-sided faces of thin materials the material of a sheet, which is appended to
 /// SceneGeometry::materials. Faces of closed bodies keep theirs: nothing gets to their other side.

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include "emit/scene/scene_desc.hpp"
+
+/// Temperature of what the last layer of a material rests on.
+namespace emit::scene {
+
+/// Returns the mean of the outdoor air over the day that ends at simulation time 0, K: of the
+/// weather table, or of the clear-sky models without one.
+[[nodiscard]] double mean_air_k(const ScenarioDesc& scenario) noexcept;
+
+/// Returns Material::base_k for the kind of base of a material whose number the user does not
+/// state: of the ground at the depth of its layers by place, date and weather, or mean_air_k().
+[[nodiscard]] double base_temperature_k(const Material& material, const ScenarioDesc& scenario);
+
+/// Gives every material of the scenario without a stated number the temperature of its base.
+/// @pre place, epoch and weather of the scenario are set
+void resolve_bases(ScenarioDesc& scenario);
+
+}  // namespace emit::scene
