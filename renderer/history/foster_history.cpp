@@ -177,27 +177,29 @@ physics::Result<std::vector<FosterMaterial>> foster_materials(
       out.push_back(entry);
       continue;
     }
-    if (options.foster_modes == 0 && !material.foster_modes.empty()) {
-      for (const scene::FosterMode& mode : material.foster_modes) {
-        if (entry.network.count == physics::kMaxFosterModes) break;
-        entry.network.modes[entry.network.count++] = {mode.tau_s, mode.resistance_m2k_w};
-      }
-      out.push_back(entry);
-      continue;
-    }
     std::vector<physics::StackLayer> layers;
     for (const scene::Layer& layer : material.layers) {
       layers.push_back({layer.thickness_m, layer.conductivity_w_m_k,
                         layer.density_kg_m3 * layer.specific_heat_j_kg_k});
     }
-    const std::size_t modes =
-        options.foster_modes == 0 ? physics::kMaxFosterModes : std::size_t{options.foster_modes};
-    auto network = physics::network_of_stack(layers, {.modes = modes});
-    if (!network) {
-      return physics::make_error(
-          ErrorCode::config, fmt::format("material '{}': {}", material.name, network.error().text));
+    if (options.foster_modes == 0 && !material.foster_modes.empty()) {
+      for (const scene::FosterMode& mode : material.foster_modes) {
+        if (entry.network.count == physics::kMaxFosterModes) break;
+        entry.network.modes[entry.network.count++] = {mode.tau_s, mode.resistance_m2k_w};
+      }
+    } else {
+      const std::size_t modes =
+          options.foster_modes == 0 ? physics::kMaxFosterModes : std::size_t{options.foster_modes};
+      auto network = physics::network_of_stack(layers, {.modes = modes});
+      if (!network) {
+        return physics::make_error(
+            ErrorCode::config,
+            fmt::format("material '{}': {}", material.name, network.error().text));
+      }
+      entry.network = *network;
     }
-    entry.network = *network;
+    entry.body = material.rests_on_body();
+    if (entry.body) entry.base_shares = physics::base_shares(layers, entry.network);
     out.push_back(entry);
   }
   return out;

@@ -263,6 +263,14 @@ const KeyTable<ObjectDraft>& object_keys() {
             "scale and rotation."),
         boolean<ObjectDraft>("on", EMIT_FIELD(desc.on),
                              "Entities: present until host or trajectory says otherwise."),
+        number<ObjectDraft>("interior_heat_j_m2_k", "J m-2 K-1", between(100, 1e7),
+                            EMIT_FIELD(desc.interior.heat_j_m2_k),
+                            "Heat capacity of the interior behind faces whose material rests on "
+                            "`body`, by area of these faces."),
+        number<ObjectDraft>("interior_ventilation_w_m2_k", "W m-2 K-1", between(0, 1000),
+                            EMIT_FIELD(desc.interior.ventilation_w_m2_k),
+                            "Exchange of air between that interior and the outside, by area of the "
+                            "same faces."),
     };
     append_pose_keys<ObjectDraft>(table, EMIT_FIELD(pose), "the object");
     table.push_back(custom<ObjectDraft>(

@@ -39,6 +39,7 @@ class SceneLoader {
       if (auto added = add_object(i); !added) {
         return tl::unexpected(added.error());
       }
+      geometry_.interiors.push_back(scenario_.objects[i].interior);
     }
     separate_coplanar();
     const std::vector<std::uint32_t> index_of = lookup_.finish(geometry_);

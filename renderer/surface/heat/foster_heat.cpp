@@ -172,6 +172,7 @@ bool FosterHeat::begin_advance(const SampleAdvance& each, const HeatInterval& in
   // Reduce the resistances at the foot of a solid (physics.md eq. 23).
   FosterSurface<double>& surface = lane.surface;
   surface = surfaces_[sample.material];
+  surface.base_offset_k += count_from_body(each, -1.0);
   for (std::size_t i = 0; i < physics::kMaxFosterModes; ++i) {
     surface.resistance_m2k_w[i] *= sample.open_frac[i];
   }
@@ -196,6 +197,38 @@ bool FosterHeat::begin_advance(const SampleAdvance& each, const HeatInterval& in
   return true;
 }
 
+BaseConductance FosterHeat::base_conductance(std::uint32_t material) const noexcept {
+  const FosterMaterial& m = materials_[material];
+  BaseConductance out;
+  for (std::size_t i = 0; i < m.network.count; ++i) {
+    out.sudden_w_m2_k += m.base_shares[i] * m.base_shares[i] / m.network.modes[i].resistance_m2k_w;
+  }
+  if (m.network.count != 0) out.steady_w_m2_k = 1.0 / m.network.resistance_m2k_w();
+  return out;
+}
+
+double FosterHeat::into_base_w_m2(std::uint32_t material, const SampleState& state) const noexcept {
+  const FosterMaterial& m = materials_[material];
+  const double base_k = surfaces_[material].base_offset_k;
+  double flux_w_m2 = 0.0;
+  for (std::size_t i = 0; i < m.network.count; ++i) {
+    flux_w_m2 += m.base_shares[i] / m.network.modes[i].resistance_m2k_w *
+                 (state.modes_k[i] + m.base_shares[i] * base_k);
+  }
+  return flux_w_m2;
+}
+
+double FosterHeat::count_from_body(const SampleAdvance& each, double sign) const noexcept {
+  const SurfaceSample& sample = *each.sample;
+  if (sample.body < 0) return 0.0;
+  const double warmer_k = each.drive.body_k - surfaces_[sample.material].base_offset_k;
+  const FosterState<double>& shares = materials_[sample.material].base_shares;
+  for (std::size_t i = 0; i < physics::kMaxFosterModes; ++i) {
+    each.state->modes_k[i] += sign * shares[i] * warmer_k;
+  }
+  return warmer_k;
+}
+
 template <std::size_t most>
 void FosterHeat::advance_group(std::span<SampleAdvance> group,
                                const HeatInterval& interval) const noexcept {
@@ -213,6 +246,7 @@ void FosterHeat::advance_group(std::span<SampleAdvance> group,
   physics::foster_advance_all(std::span(lanes).first(count), tolerance_k_);
   for (std::size_t i = 0; i < group.size(); ++i) {
     SampleAdvance& each = group[i];
+    count_from_body(each, 1.0);
     each.output = output_of(*each.sample, at_end, ends[i], each.drive, each.drive.part.end,
                             offset_k(each.sample->material, *each.state));
   }

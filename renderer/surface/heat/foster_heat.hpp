@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <glm/ext/vector_float3.hpp>
@@ -11,6 +12,13 @@
 #include "surface/heat/surface_samples.hpp"
 
 namespace emit::renderer {
+
+/// Conductances between a stack and its base, W m-2 K-1: for a sudden change of the base, and for a
+/// steady one.
+struct BaseConductance {
+  double sudden_w_m2_k = 0.0;
+  double steady_w_m2_k = 0.0;
+};
 
 /// Extended thermal model on samples: surface balance, flux-driven states, radiation of other
 /// samples and conduction across edges (physics.md eq. 16-18, 20, 22).
@@ -40,6 +48,28 @@ class FosterHeat {
   [[nodiscard]] bool is_sheet(std::uint32_t material) const noexcept {
     return materials_[material].sheet;
   }
+
+  /// Returns whether a material rests on the interior of its body.
+  [[nodiscard]] bool rests_on_body(std::uint32_t material) const noexcept {
+    return materials_[material].body;
+  }
+  [[nodiscard]] bool has_bodies() const noexcept {
+    return std::ranges::any_of(materials_, &FosterMaterial::body);
+  }
+  /// Returns the temperature at which the base of a material starts, from the reference
+  /// temperature.
+  [[nodiscard]] double base_offset_k(std::uint32_t material) const noexcept {
+    return surfaces_[material].base_offset_k;
+  }
+  /// Returns a temperature as an offset from the reference temperature.
+  [[nodiscard]] double offset_of_k(double temperature_k) const noexcept {
+    return temperature_k - reference_k_;
+  }
+  [[nodiscard]] BaseConductance base_conductance(std::uint32_t material) const noexcept;
+  /// Returns the flux that a stack in this state would pass into a base of the reference
+  /// temperature (physics.md eq. 28).
+  [[nodiscard]] double into_base_w_m2(std::uint32_t material,
+                                      const SampleState& state) const noexcept;
 
   /// Returns the output of a sample in this state; see SampleHeat::output().
   SampleOutput output(const SurfaceSample& sample, const glm::vec3& normal,
@@ -78,6 +108,10 @@ class FosterHeat {
   /// `lane`. `end` is what arrives at the face at the end of the interval.
   [[nodiscard]] bool begin_advance(const SampleAdvance& each, const HeatInterval& interval,
                                    const Incoming& end, physics::FosterLane& lane) const noexcept;
+  /// Counts the modes of a sample on a body from its interior (`sign` = -1), or from the base of
+  /// its material again (+1), physics.md eq. 27. Returns how much warmer the interior is than that
+  /// base.
+  double count_from_body(const SampleAdvance& each, double sign) const noexcept;
   /// Advances up to `most` samples.
   template <std::size_t most>
   void advance_group(std::span<SampleAdvance> group, const HeatInterval& interval) const noexcept;

@@ -62,6 +62,9 @@ struct SampleDrive {
   double longwave_begin_w_m2 = 0.0;
   double longwave_end_w_m2 = 0.0;
   double shortwave_w_m2 = 0.0;
+  /// Temperature of the interior of the sample's body, mean over the interval, from the reference
+  /// temperature. It counts if the sample has a body.
+  double body_k = 0.0;
   /// Net fluxes into the faces of the partners at the begin and the end of the interval (physics.md
   /// eq. 22).
   std::array<double, kMaxPartners> partner_begin_w_m2{};

@@ -59,6 +59,21 @@ class SampleHeat {
                      std::span<const double> times_s,
                      std::span<double> response_m2k_w) const noexcept;
 
+  /// Returns whether a material rests on the interior of its body. With emit2014 none does.
+  [[nodiscard]] bool rests_on_body(std::uint32_t material) const noexcept {
+    const auto* foster = std::get_if<FosterHeat>(&model_);
+    return foster != nullptr && foster->rests_on_body(material);
+  }
+  /// Returns whether any material does.
+  [[nodiscard]] bool has_bodies() const noexcept {
+    const auto* foster = std::get_if<FosterHeat>(&model_);
+    return foster != nullptr && foster->has_bodies();
+  }
+  /// The model of bodies. @pre some material rests on a body
+  [[nodiscard]] const FosterHeat& of_bodies() const noexcept {
+    return *std::get_if<FosterHeat>(&model_);
+  }
+
   /// Returns the measure by which directions of the sky count: all directions of the full sphere
   /// alike (emit2014), or by the cosine to the normal (foster).
   [[nodiscard]] SkyMeasure sky_measure() const noexcept {

@@ -76,6 +76,7 @@ struct SurfaceNode {
   /// Forcing of the interval that ends at this node, as it was assumed when the node was computed.
   IntervalForcing forcing;
   physics::FosterState<double> surroundings{};  ///< state of the surroundings
+  std::vector<double> body_k;  ///< interiors of the bodies, from the reference temperature
   std::optional<double> surroundings_k;  ///< set if the thermal model computes their temperature
 };
 

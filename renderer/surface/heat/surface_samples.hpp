@@ -37,6 +37,7 @@ struct SurfaceSample {
   glm::vec3 position_m{0.0F};
   glm::vec3 normal{0.0F};    ///< outward, unit length
   std::int32_t entity = -1;  ///< entity, or -1: static
+  std::int32_t body = -1;    ///< body whose interior the layers rest on, or -1: a fixed temperature
   std::uint32_t material = 0;
   float sky_frac = 1.0F;  ///< cosine-weighted share of the hemisphere that shows sky
   float far_frac = 0.0F;  ///< share of the hemisphere whose rays leave the scene below the horizon

@@ -2,9 +2,9 @@
 #include "surface/model/entity_exitance.hpp"
 
 #include <algorithm>
-#include <glm/geometric.hpp>
+#include <cmath>
 
-#include "surface/mesh/sheet_sides.hpp"
+#include "surface/model/vertex_areas.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -26,21 +26,7 @@ EntityExitance::EntityExitance(const SurfaceModel& model, const scene::SceneGeom
     const scene::Instance& instance = geometry.instances[p];
     if (entity_of_object[instance.object] < 0) continue;
     const RefinedMesh& mesh = model.meshes[instance.mesh];
-    // Give each vertex a third of the area of its triangles, measured in the body frame, where the
-    // instance has its true size.
-    std::vector<float> area_m2(mesh.vertices().size());
-    for (std::uint32_t slot = 0; slot < mesh.leaf_count(); ++slot) {
-      std::array<glm::dvec3, 3> corner_m;
-      for (std::size_t k = 0; k < 3; ++k) {
-        const glm::vec3& at_m = mesh.vertices()[mesh.leaf(slot)[k]].position_m;
-        corner_m[k] = glm::dvec3(instance.body_from_mesh * glm::dvec4(glm::dvec3(at_m), 1.0));
-      }
-      const double twice_m2 =
-          glm::length(glm::cross(corner_m[1] - corner_m[0], corner_m[2] - corner_m[0]));
-      for (const std::uint32_t v : mesh.leaf(slot)) {
-        area_m2[v] += static_cast<float>(twice_m2 / 6.0);
-      }
-    }
+    const std::vector<float> area_m2 = vertex_areas_m2(mesh, instance);
     // List the samples that others can see. A sheet sends from both of its sides.
     const std::uint32_t first = model.first_sample[p];
     for (std::uint32_t v = 0; v < area_m2.size(); ++v) {

@@ -54,6 +54,7 @@ struct SurfaceModel {
   std::uint32_t drawn_samples = 0;    ///< number of samples that belong to vertices and backs
   std::vector<SampleState> states;    ///< states at the end of the record
   std::vector<SampleOutput> outputs;  ///< outputs at the end of the record
+  std::vector<double> body_k;         ///< interiors of bodies there, from the reference temperature
   bool full = false;                  ///< the refinement stopped at max_samples
   bool full_in_view = false;          ///< surfaces in the field of view were then still too coarse
 };

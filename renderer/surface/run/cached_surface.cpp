@@ -156,7 +156,8 @@ void CachedSurface::begin_first_interval(std::int64_t start_ns, const Inputs& in
                                          const StepPlan& plan, SurfaceHistory& history) {
   const std::size_t count = model_->samples.samples.size();
   // Move the states of the model into node 0.
-  nodes_.begin(std::move(model_->states), std::move(model_->outputs), model_->drawn_samples);
+  nodes_.begin(std::move(model_->states), std::move(model_->outputs), model_->drawn_samples,
+               model_->body_k);
   SurfaceNode& first = nodes_[0];
   first.at_ns = start_ns;
   first.surroundings = history.surroundings();

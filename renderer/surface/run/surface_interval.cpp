@@ -35,6 +35,9 @@ void SurfaceInterval::reset(const SurfaceModel& model, std::vector<EntityAnchor>
   done_ = 0;
   exitance_ = {};
   faces_.clear();
+  bodies_ = BodyNodes(model, geometry_.geometry(), heat_);
+  inflow_w_.assign(bodies_.size(), 0.0);
+  body_mean_k_.assign(bodies_.size(), 0.0);
   if (!exchange) return;
   exitance_ = EntityExitance(model, geometry_.geometry(), geometry_.entity_of_object());
   faces_.assign(geometry_.entities(), {});
@@ -57,6 +60,16 @@ void SurfaceInterval::begin(const SurfaceNode& from, SurfaceNode& to, const Surf
   exitance_.measure(
       all, rays_, [&from](std::size_t sample) { return from.outputs[sample].longwave_out_w_m2; },
       faces_);
+  // Advance the interiors of bodies with what their faces pass inwards at the begin.
+  const IntervalForcing& forcing = interval_.forcing;
+  bodies_.sum_inflow(all, from.states, inflow_w_);
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    const auto course = bodies_.advance(
+        b, from.body_k[b], {inflow_w_[b], heat_.of_bodies().offset_of_k(forcing.begin.air_k)},
+        {inflow_w_[b], heat_.of_bodies().offset_of_k(forcing.end.air_k)}, forcing.dt_s);
+    to.body_k[b] = course.end_k;
+    body_mean_k_[b] = course.mean_k;
+  }
   done_ = 0;
 }
 

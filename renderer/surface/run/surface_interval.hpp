@@ -8,6 +8,7 @@
 #include "surface/heat/heat_interval.hpp"
 #include "surface/heat/sample_heat.hpp"
 #include "surface/heat/surface_node.hpp"
+#include "surface/model/body_nodes.hpp"
 #include "surface/model/entity_exitance.hpp"
 #include "surface/model/surface_model.hpp"
 #include "surface/rays/interval_rays.hpp"
@@ -65,7 +66,7 @@ class SurfaceInterval {
   [[nodiscard]] const HeatInterval& heat_interval() const noexcept { return interval_; }
   /// Input that all steps share in this interval.
   [[nodiscard]] SurfaceStep step(const SurfaceSamples& all) const noexcept {
-    return {all, heat_, geometry_.rays(), faces_};
+    return {all, heat_, geometry_.rays(), faces_, body_mean_k_};
   }
 
  private:
@@ -75,6 +76,9 @@ class SurfaceInterval {
   HeatInterval interval_;
   EntityExitance exitance_;
   std::vector<EntityFaces> faces_;  ///< by entity, at the node with which the interval begins
+  BodyNodes bodies_;
+  std::vector<double> inflow_w_;     ///< by body, at the node with which the interval begins
+  std::vector<double> body_mean_k_;  ///< by body, mean over the interval
   std::uint32_t turn_ = 0;
   std::uint32_t done_ = 0;
 };

@@ -9,10 +9,13 @@
 namespace emit::renderer {
 
 void SurfaceNodes::begin(std::vector<SampleState> states, std::vector<SampleOutput> outputs,
-                         std::size_t drawn) {
+                         std::size_t drawn, std::span<const double> body_k) {
   EMIT_CHECK_OP(states.size(), ==, outputs.size());
   ring_ = 0;
-  for (SurfaceNode& node : nodes_) node.vertices.assign(drawn, {});
+  for (SurfaceNode& node : nodes_) {
+    node.vertices.assign(drawn, {});
+    node.body_k.assign(body_k.begin(), body_k.end());
+  }
   for (std::size_t index : {1U, 2U}) {
     (*this)[index].states.assign(states.size(), {});
     (*this)[index].outputs.assign(outputs.size(), {});
@@ -61,6 +64,9 @@ void SurfaceNodes::cut(std::int64_t event_ns, std::int64_t end_ns, const LocalSt
     }
   });
   first.surroundings = between(first.surroundings, second.surroundings, frac);
+  for (std::size_t b = 0; b < first.body_k.size(); ++b) {
+    first.body_k[b] = between(first.body_k[b], second.body_k[b], frac);
+  }
   if (first.surroundings_k && second.surroundings_k) {
     first.surroundings_k = between(*first.surroundings_k, *second.surroundings_k, frac);
   }

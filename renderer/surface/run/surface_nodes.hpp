@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "surface/heat/surface_node.hpp"
@@ -19,9 +20,10 @@ namespace emit::renderer {
 /// but begin() is RT-safe.
 class SurfaceNodes {
  public:
-  /// Makes node 0 of these states and outputs, and takes memory for the others. The first `drawn`
-  /// samples are vertices. @pre states and outputs have equal sizes
-  void begin(std::vector<SampleState> states, std::vector<SampleOutput> outputs, std::size_t drawn);
+  /// Makes node 0 of these states, outputs and interiors of bodies, and takes memory for the
+  /// others. The first `drawn` samples are vertices. @pre states and outputs have equal sizes
+  void begin(std::vector<SampleState> states, std::vector<SampleOutput> outputs, std::size_t drawn,
+             std::span<const double> body_k);
 
   /// A node. @pre index < 3
   [[nodiscard]] SurfaceNode& operator[](std::size_t index) noexcept {

@@ -51,6 +51,7 @@ SampleDrive drive_of(const SurfaceStep& step, const IntervalRays& interval_rays,
   SampleDrive drive;
   drive.sun_frac = sun.frac;
   drive.take_part(parts, sample);
+  if (sample.body >= 0) drive.body_k = step.body_k[static_cast<std::size_t>(sample.body)];
   // Replace the sky behind entities by the long-wave radiation of the one that hides most.
   const HiddenSky hidden = interval_rays.hidden_sky(step.rays, sample, offsets.around_m);
   drive.hidden_sky_frac = hidden.frac;

@@ -22,6 +22,7 @@ struct SurfaceStep {
   const SampleHeat& heat;
   const CasterRays& rays;
   std::span<const EntityFaces> faces;  ///< by entity; if empty, entities send what surroundings do
+  std::span<const double> body_k;      ///< by body: interior, mean over the interval; offsets
 };
 
 /// Result of a step of a sample. `behind` is the output of a sheet's other face, which has the same

@@ -75,8 +75,8 @@ void visit_members(T& s, const Visit& visit) {
 template <class T, class Visit>
 requires std::same_as<std::remove_const_t<T>, SurfaceSample>
 void visit_members(T& s, const Visit& visit) {
-  visit(s.position_m), visit(s.normal), visit(s.entity), visit(s.material), visit(s.sky_frac),
-      visit(s.sphere_sky_frac), visit(s.hull_open_frac), visit(s.hull_tilt_frac);
+  visit(s.position_m), visit(s.normal), visit(s.entity), visit(s.body), visit(s.material),
+      visit(s.sky_frac), visit(s.sphere_sky_frac), visit(s.hull_open_frac), visit(s.hull_tilt_frac);
   visit(s.far_frac), visit(s.first_seen), visit(s.seen_count), visit(s.seen_scale);
   visit(s.covered);
   visit(s.open_frac), visit(s.open_before_frac), visit(s.flat_m), visit(s.facet_m);
@@ -120,6 +120,7 @@ void put_model(Sink& sink, const SurfaceModel& model) {
   put_value(sink, model.drawn_samples);
   put_value(sink, model.states);
   put_value(sink, model.outputs);
+  put_value(sink, model.body_k);
   put_value(sink, model.full);
   put_value(sink, model.full_in_view);
 }
@@ -216,7 +217,8 @@ bool consistent(const SurfaceModel& model, const scene::SceneGeometry& geometry,
   };
   const auto sample_fits = [&](const SurfaceSample& s) {
     return sides_fit(s) && s.material < geometry.materials.size() && s.entity >= -1 &&
-           s.entity < static_cast<std::int64_t>(entities) && s.first_seen <= seen &&
+           s.entity < static_cast<std::int64_t>(entities) && s.body >= -1 &&
+           s.body < static_cast<std::int64_t>(model.body_k.size()) && s.first_seen <= seen &&
            s.seen_count <= seen - s.first_seen &&
            std::ranges::all_of(s.partners, [&](const Partner& partner) {
              return partner.sample == kNoSample || partner.sample < count;
@@ -396,6 +398,7 @@ Result<SurfaceModel> read_state(const std::filesystem::path& file, const StateWa
   take_value(source, model.drawn_samples);
   take_value(source, model.states);
   take_value(source, model.outputs);
+  take_value(source, model.body_k);
   take_value(source, model.full);
   take_value(source, model.full_in_view);
   // Check all indices: a file with a matching checksum may still be made by a faulty program.

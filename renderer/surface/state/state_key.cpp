@@ -54,7 +54,8 @@ std::uint64_t scene_hash(const scene::ScenarioDesc& scenario,
     add(hash, instance.mesh, instance.object, instance.body_from_mesh, instance.world_from_mesh);
   }
   for (const scene::ObjectDesc& object : scenario.objects) {
-    add(hash, object.entity_id, object.on);
+    add(hash, object.entity_id, object.on, object.interior.heat_j_m2_k,
+        object.interior.ventilation_w_m2_k);
     add_keys(hash, object.trajectory);
     for (const scene::PartDesc& part : object.parts) {
       add(hash, part.id, part.material, part.curve.given, part.curve.idle_k, part.curve.full_k,
@@ -71,7 +72,8 @@ std::uint64_t scene_hash(const scene::ScenarioDesc& scenario,
 /// the temperature.
 void add_material(Fnv64& hash, const scene::Material& material) {
   add(hash, material.solar_absorptance_frac, material.emissivity_frac, material.base_k,
-      material.layers.size(), material.foster_modes.size(), material.modes.size(), material.sheet);
+      material.layers.size(), material.foster_modes.size(), material.modes.size(), material.sheet,
+      material.rests_on_body());
   for (const scene::Layer& layer : material.layers) {
     add(hash, layer.thickness_m, layer.conductivity_w_m_k, layer.density_kg_m3,
         layer.specific_heat_j_kg_k);

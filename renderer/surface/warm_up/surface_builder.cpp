@@ -13,6 +13,7 @@
 #include "emit/threads/parallel.hpp"
 #include "surface/mesh/refined_mesh_edges.hpp"
 #include "surface/mesh/sheet_sides.hpp"
+#include "surface/model/body_nodes.hpp"
 #include "surface/model/surface_model.hpp"
 #include "surface/rays/ray_offsets.hpp"
 #include "surface/warm_up/facet_edges.hpp"
@@ -448,6 +449,7 @@ physics::Result<SurfaceModel> Builder::run() {
   }
   // Lay all samples out in one array, and integrate their history again with exchange.
   number_samples(in_, options_, patches_, model_);
+  name_bodies(in_.geometry, in_.heat, model_);
   const auto exchanged = [this](double frac) {
     return report(kEvaluatedFrac + (1.0 - kEvaluatedFrac) * frac);
   };

@@ -12,12 +12,13 @@
 #include "emit/threads/parallel.hpp"
 #include "surface/mesh/sheet_sides.hpp"
 #include "surface/model/entity_exitance.hpp"
+#include "surface/warm_up/body_courses.hpp"
 
 namespace emit::renderer {
 namespace {
 
-/// Samples in one task of a parallel loop.
-constexpr std::size_t kGrain = 64;
+/// Groups of samples in one task of a parallel loop.
+constexpr std::size_t kGrain = 8;
 constexpr std::uint32_t kNoList = 0xffffffffU;
 
 /// Sum of the radiation of the seen samples of every list, over the whole history. The weights are
@@ -83,8 +84,8 @@ class Sweeper {
  private:
   /// Measures the radiation of the faces of entities at every node, from the latest sweep.
   void measure_faces();
-  /// Returns true if no sweep changes the sample: it sees no other one, has no partner, and no
-  /// entity that sends radiation hides its sky.
+  /// Returns true if no sweep changes the sample: it sees no other one, has no partner and no body,
+  /// and no entity that sends radiation hides its sky.
   [[nodiscard]] bool alone(std::size_t s) const noexcept;
   /// Input of sample `s` in interval j, without the fluxes of its partners.
   [[nodiscard]] SampleDrive drive(std::size_t s, const glm::vec3& normal,
@@ -92,9 +93,8 @@ class Sweeper {
   /// Adds the radiation of the entity that hides most of the sample's sky in interval j.
   void add_exitance(std::size_t s, const glm::vec3& normal, std::size_t j,
                     SampleDrive& drive) const noexcept;
-  /// Integrates samples, and the other faces of sheets with them, over the record.
-  /// @pre there are at most kAdvanceTogether
-  void carry(std::span<const std::uint32_t> samples);
+  /// Integrates the samples of a group, and the other faces of sheets with them, over the record.
+  void carry(std::size_t group);
   /// Input of sample `s` in interval j, with the fluxes of its partners.
   [[nodiscard]] SampleDrive whole_drive(std::size_t s, const glm::vec3& normal,
                                         std::size_t j) const noexcept;
@@ -111,6 +111,7 @@ class Sweeper {
   SeenRadiation seen_;
   EntityExitance exitance_;
   std::vector<EntityFaces> faces_;  ///< by node, then entity; empty without exchange or entities
+  std::optional<BodyCourses> bodies_;
 };
 
 Sweeper::Sweeper(const SurfaceInputs& inputs, const ExchangeOptions& options,
@@ -143,6 +144,8 @@ Sweeper::Sweeper(const SurfaceInputs& inputs, const ExchangeOptions& options,
     give_row(s);
     if (other != kNoSample) give_row(other);
   }
+  bodies_.emplace(model, inputs.geometry, inputs.heat, inputs.record, swept_, kAdvanceTogether);
+  model.body_k = bodies_->end_k();
 }
 
 void Sweeper::measure_faces() {
@@ -160,11 +163,11 @@ void Sweeper::measure_faces() {
 void Sweeper::sweep() {
   // Gather the radiation of the sweep before, then integrate every sample that it can change.
   seen_.gather(before_);
-  threads::parallel_parts(swept_.size(), kGrain, [&](std::size_t from, std::size_t to) {
-    for (std::size_t i = from; i < to; i += kAdvanceTogether) {
-      carry(std::span(swept_).subspan(i, std::min(to - i, kAdvanceTogether)));
-    }
+  threads::parallel_parts(bodies_->groups().size(), kGrain, [&](std::size_t from, std::size_t to) {
+    for (std::size_t group = from; group < to; ++group) carry(group);
   });
+  bodies_->correct();
+  model_.body_k = bodies_->end_k();
   // Make the result of this sweep the input of the next one.
   std::swap(before_, after_);
   measure_faces();
@@ -172,7 +175,7 @@ void Sweeper::sweep() {
 
 bool Sweeper::alone(std::size_t s) const noexcept {
   const SurfaceSample& sample = model_.samples.samples[s];
-  if (sample.seen_count != 0) return false;
+  if (sample.seen_count != 0 || sample.body >= 0) return false;
   for (const Partner& partner : sample.partners) {
     if (partner.sample != kNoSample) return false;
   }
@@ -187,6 +190,7 @@ SampleDrive Sweeper::drive(std::size_t s, const glm::vec3& normal, std::size_t j
   const SampleHistories::Rows& rows = histories_.rows[s];
   drive.sun_frac = rows.sun_frac[j];
   drive.take_part(in_.record.intervals[j].parts, sample);
+  if (sample.body >= 0) drive.body_k = bodies_->mean_k(sample.body, j);
   if (!rows.hidden_sky.empty()) drive.hidden_sky_frac = rows.hidden_sky[j].frac;
   // Add what the seen samples send, scaled to the share of the hemisphere that they fill.
   if (const std::span<const double> received_w_m2 = seen_.of(sample); !received_w_m2.empty()) {
@@ -227,8 +231,13 @@ SampleDrive Sweeper::whole_drive(std::size_t s, const glm::vec3& normal,
   return drive;
 }
 
-void Sweeper::carry(std::span<const std::uint32_t> samples) {
-  EMIT_DCHECK_OP(samples.size(), <=, kAdvanceTogether);
+void Sweeper::carry(std::size_t group) {
+  const BodyCourses::Group& chosen = bodies_->groups()[group];
+  const std::span<const std::uint32_t> samples =
+      std::span(swept_).subspan(chosen.first, chosen.count);
+  const auto add_to_body = [&](std::size_t i, std::size_t node, const SampleState& state) {
+    if (chosen.body >= 0) bodies_->add(group, node, samples[i], state);
+  };
   const std::vector<SurfaceSample>& all = model_.samples.samples;
   std::array<SampleAdvance, kAdvanceTogether> fronts;
   std::array<SampleState, kAdvanceTogether> states;
@@ -256,6 +265,7 @@ void Sweeper::carry(std::span<const std::uint32_t> samples) {
       front.drive = whole_drive(s, front.normal, j);
       const bool first = j == 0;
       if (first) {
+        add_to_body(i, 0, states[i]);
         after_[s].keep_begin(
             in_.heat.output(*front.sample, front.normal, begin, front.drive, states[i]));
       }
@@ -272,6 +282,7 @@ void Sweeper::carry(std::span<const std::uint32_t> samples) {
     for (std::size_t i = 0; i < samples.size(); ++i) {
       const SampleAdvance& front = fronts[i];
       after_[samples[i]].keep_end(j, front.output);
+      add_to_body(i, j + 1, states[i]);
       if (front.back == nullptr) continue;
       const std::uint32_t other = front.sample->other_side;
       back_drives[i].longwave_begin_w_m2 = back_drives[i].longwave_end_w_m2;

@@ -100,9 +100,11 @@ class PatchSampler {
                const SurfaceModelOptions& options);
 
   [[nodiscard]] const SunTracer& tracer() const noexcept { return tracer_; }
-  /// Returns true if samples exchange heat with others, so that the histories of their output are
-  /// needed.
-  [[nodiscard]] bool keeps_sent() const noexcept { return options_.exchange || options_.lateral; }
+  /// Returns true if samples exchange heat with others or with the interior of their body, so that
+  /// the histories of their output are needed.
+  [[nodiscard]] bool keeps_sent() const noexcept {
+    return options_.exchange || options_.lateral || in_.heat.has_bodies();
+  }
 
   /// Start state of the latest sample. Neighbours face alike and start with the same state. Each
   /// thread has its own memo.

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "emit/threads/parallel.hpp"
+#include "surface/rays/ray_offsets.hpp"
 
 namespace emit::renderer {
 namespace {

@@ -82,11 +82,29 @@ struct NetworkOptions {
 [[nodiscard]] Result<FosterNetwork> network_of_stack(std::span<const StackLayer> layers,
                                                      const NetworkOptions& options = {});
 
-// ---- one step -----------------------------------------------------------------------------------
-
 /// States x_i of a surface, K above the base.
 template <class Real>
 using FosterState = std::array<Real, kMaxFosterModes>;
+
+// ---- moving base --------------------------------------------------------------------------------
+
+/// Returns the temperature of the surface of a stack per temperature of its base at an angular
+/// frequency, when no heat passes through the surface. It is 1 at frequency 0. Any thread. RT-safe.
+[[nodiscard]] std::complex<double> stack_transfer(std::span<const StackLayer> layers,
+                                                  double angular_rad_s) noexcept;
+
+/// Returns the shares c_i with which the modes of a network take part in a change of the base
+/// (physics.md eq. 27):
+///
+///   T = sum w_i,   tau_i w_i' = r_i q + c_i T_base - w_i,   sum c_i = 1
+///
+/// They are fitted to stack_transfer() over the periods of `options`. By reciprocity the stack
+/// passes the flux sum c_i (w_i - c_i T_base) / r_i into its base. Any thread. RT-safe.
+[[nodiscard]] FosterState<double> base_shares(std::span<const StackLayer> layers,
+                                              const FosterNetwork& network,
+                                              const NetworkOptions& options = {}) noexcept;
+
+// ---- one step -----------------------------------------------------------------------------------
 
 /// RelaxationGains of every mode over one step.
 template <class Real>

@@ -89,6 +89,7 @@ struct SceneGeometry {
   /// Materials in use, in the order of the library. Entry 0 is the default material, in use or not.
   std::vector<Material> materials;
   std::vector<MaterialMapping> mappings;
+  std::vector<BodyInterior> interiors;  ///< by object; one that is absent has the default
   std::vector<std::string> warnings;    ///< faults of the files and what was done about them
   std::uint64_t triangles = 0;          ///< sum over the instances
   std::uint64_t dropped_triangles = 0;  ///< triangles of zero area, counted once per file

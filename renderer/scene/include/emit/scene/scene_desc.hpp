@@ -70,7 +70,16 @@ enum class BaseKind : std::uint8_t {
   ground,  ///< ground at the depth of the layers: annual wave of the air at place and date
   air,     ///< outdoor air, its mean over a day
   room,    ///< a heated room, a cooled tank or a core: a stated temperature
-  body,    ///< interior of a vehicle, which follows the outdoor air
+  body,    ///< interior of a vehicle, which its faces heat and cool
+};
+
+/// Interior of a body, for the faces whose material rests on it (BaseKind::body). Both numbers
+/// count per area of those faces.
+struct BodyInterior {
+  double heat_j_m2_k = 10'000.0;    ///< heat capacity
+  double ventilation_w_m2_k = 0.5;  ///< exchange of air with the outside
+
+  [[nodiscard]] bool operator==(const BodyInterior&) const = default;
 };
 
 /// Thermal and optical properties of a surface and of the body under it.
@@ -102,6 +111,12 @@ struct Material {
   bool sheet = false;
   std::string source;       ///< origin of the numbers
   std::string uncertainty;  ///< known error of the numbers
+
+  /// True if the temperature under the last layer is that of the interior of the body that the
+  /// surface belongs to. base_k is then where it starts.
+  [[nodiscard]] bool rests_on_body() const noexcept {
+    return base == BaseKind::body && !base_stated && !prescribed_k && !sheet;
+  }
 };
 
 /// One node of a trajectory: linear in position, slerp in attitude; `on` holds until the next one.
@@ -169,6 +184,7 @@ struct ObjectDesc {
   Trajectory trajectory;  ///< entities only; empty: stays at its placement until the host moves it
   bool on = true;         ///< entities only: on state without a trajectory
   std::vector<PartDesc> parts;  ///< entities only: what heats itself
+  BodyInterior interior;        ///< interior that faces of a material with base `body` share
 };
 
 /// Joint between two bodies that touch. Bodies that no contact names conduct to each other as if
