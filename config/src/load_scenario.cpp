@@ -111,6 +111,19 @@ void take_climate(const Node& table, physics::ClearSky& sky, ScenarioDesc& scena
                   scenario.file.string(), taken));
 }
 
+/// Gives samples without a wind that of their film. Reports samples with neither.
+void complete_wind(const Node& array, std::vector<scene::WeatherSample>& samples,
+                   Diagnostics& diagnostics) {
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (array.items[i].has("wind_m_s")) continue;
+    if (!samples[i].film_w_m2_k) {
+      diagnostics.add(array.items[i].at, "'wind_m_s' is needed where 'film_w_m2_k' is not given");
+      continue;
+    }
+    samples[i].wind_m_s = wind_of_film_m_s(*samples[i].film_w_m2_k);
+  }
+}
+
 /// Reads the weather. The thermal options say how far back it has to reach.
 void resolve_weather(const Node& root, ScenarioDesc& scenario, Diagnostics& diagnostics) {
   const Node& table = section(root, "weather", diagnostics);
@@ -136,6 +149,9 @@ void resolve_weather(const Node& root, ScenarioDesc& scenario, Diagnostics& diag
     scenario.weather = std::move(*loaded);
   } else {
     scenario.weather = std::move(draft.samples);
+    if (has_samples && diagnostics.size() == faults) {
+      complete_wind(*table.find("sample"), scenario.weather, diagnostics);
+    }
     for (std::size_t i = 1; i < scenario.weather.size() && diagnostics.size() == faults; ++i) {
       if (scenario.weather[i].sim_time_ns <= scenario.weather[i - 1].sim_time_ns) {
         diagnostics.add(key_location(table.find("sample")->items[i], "time_s"),
@@ -256,6 +272,37 @@ void warn_of_default_place_and_time(const Node& root, const Node& place, Scenari
 }
 
 }  // namespace
+
+Result<std::vector<scene::Material>> load_materials(const std::filesystem::path& file,
+                                                    std::span<const std::string> overrides) {
+  // A library is what a scenario of nothing but materials would hold.
+  Result<Node> parsed = parse_toml_file(file);
+  if (!parsed) return tl::unexpected<physics::Error>(parsed.error());
+  Diagnostics diagnostics;
+  for (const Member& member : parsed->members) {
+    if (member.key != "material") {
+      diagnostics.add(member.key_at, unknown_key_text(member.key, {"material"}));
+    }
+  }
+  for (const std::string& text : overrides) {
+    if (addresses_element_of(text, "material")) {
+      apply_override(*parsed, text, diagnostics);
+    } else {
+      diagnostics.add(parsed->at, fmt::format("override '{}' names no material", text));
+    }
+  }
+  const std::vector<Node> nodes = collect_material_nodes(*parsed, {}, diagnostics);
+  // The bands of a library are those of the scenarios that name it.
+  std::vector<std::string> bands = known_band_names({});
+  for (const Node& node : nodes) {
+    const Node* of_bands = node.find("band_emissivity_frac");
+    if (of_bands == nullptr || of_bands->kind != Node::Kind::table) continue;
+    for (const Member& member : of_bands->members) bands.push_back(member.key);
+  }
+  auto materials = resolve_materials(nodes, bands, diagnostics);
+  if (!diagnostics.empty()) return tl::unexpected<physics::Error>(diagnostics.error());
+  return materials;
+}
 
 Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
                                    std::span<const std::string> overrides,

@@ -4,6 +4,7 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "config/config_support.hpp"
+#include "emit/physics/clear_sky.hpp"
 #include "emit/physics/constants.hpp"
 
 namespace emit::config::testing {
@@ -36,6 +37,31 @@ TEST_F(ConfigTest, weather_is_read_with_columns_in_any_order) {
   EXPECT_FALSE(loaded->weather[1].film_w_m2_k.has_value());
 }
 
+TEST_F(ConfigTest, a_film_stands_for_the_wind_and_measured_sun_for_its_clouds) {
+  write("w.csv",
+        "time_s,dni_w_m2,dhi_w_m2,longwave_down_w_m2,air_k,film_w_m2_k\n0,500,100,330,290,13.3\n"
+        "600,500,100,330,290,2\n");
+  const auto loaded = scenario("[weather]\nfile = \"w.csv\"\n");
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
+  // Rows of the clear-sky models lie around those of the table.
+  const auto row = std::ranges::find(loaded->weather, 0, &scene::WeatherSample::sim_time_ns);
+  ASSERT_LT(row + 1, loaded->weather.end());
+  EXPECT_EQ(row->film_w_m2_k, 13.3);
+  EXPECT_NEAR(physics::film_coefficient_w_m2_k(row->wind_m_s), 13.3, 1e-9);
+  EXPECT_EQ(row->cloud_frac, 0.0);
+  EXPECT_NEAR((row + 1)->wind_m_s, 0.0, 1e-9);
+  const std::string sample =
+      "[[weather.sample]]\ntime_s = 0\ndni_w_m2 = 0\ndhi_w_m2 = 0\nlongwave_down_w_m2 = 300\n"
+      "air_k = 290\n";
+  const auto table = scenario(sample + "film_w_m2_k = 13.3\n");
+  ASSERT_TRUE(table.has_value()) << table.error().text;
+  const auto sampled = std::ranges::find(table->weather, 0, &scene::WeatherSample::sim_time_ns);
+  ASSERT_NE(sampled, table->weather.end());
+  EXPECT_NEAR(physics::film_coefficient_w_m2_k(sampled->wind_m_s), 13.3, 1e-9);
+  EXPECT_EQ(scenario_error(sample),
+            "s.toml:2:1: 'wind_m_s' is needed where 'film_w_m2_k' is not given");
+}
+
 struct CsvCase {
   const char* name;
   std::string text;
@@ -45,10 +71,13 @@ struct CsvCase {
 const std::vector<CsvCase>& csv_cases() {
   static const std::vector<CsvCase> all = {
       {"missing_column", "time_s,dni_w_m2\n0,1\n",
-       "w.csv:1:1: columns 'dhi_w_m2', 'longwave_down_w_m2', 'air_k', 'wind_m_s', 'cloud_frac' are "
-       "missing"},
-      {"one_missing_column", "time_s,dni_w_m2,dhi_w_m2,longwave_down_w_m2,air_k,wind_m_s\n",
-       "w.csv:1:1: column 'cloud_frac' is missing"},
+       "w.csv:1:1: columns 'dhi_w_m2', 'longwave_down_w_m2', 'air_k' are missing"},
+      {"one_missing_column", "time_s,dni_w_m2,dhi_w_m2,longwave_down_w_m2,wind_m_s\n",
+       "w.csv:1:1: column 'air_k' is missing"},
+      {"neither_wind_nor_film",
+       "time_s,dni_w_m2,dhi_w_m2,longwave_down_w_m2,air_k,film_w_m2_k\n0,0,0,300,290,12\n"
+       "60,0,0,300,290,\n",
+       "w.csv:3: 'wind_m_s' is needed where 'film_w_m2_k' is not given"},
       {"foreign_table", "date,temp,rh\n",
        "w.csv:1:1: unknown columns 'date', 'temp', 'rh' (known: 'time_s', "},
       {"unknown_column", "time_s,dni_wm2,dhi_w_m2,longwave_down_w_m2,air_k,wind_m_s,cloud_frac\n",

@@ -99,12 +99,12 @@ const KeyTable<WeatherSample>& weather_sample_keys() {
           EMIT_FIELD(longwave_down_w_m2), "Long-wave irradiance by the sky on level ground.")),
       required(number<WeatherSample>("air_k", "K", between(limits::kAirK), EMIT_FIELD(air_k),
                                      "Air temperature.")),
-      required(number<WeatherSample>("wind_m_s", "m s-1", between(limits::kWindMS),
-                                     EMIT_FIELD(wind_m_s), "Wind speed.")),
-      required(number<WeatherSample>("cloud_frac", "", between(limits::kCloudFrac),
-                                     EMIT_FIELD(cloud_frac),
-                                     "Share of the direct sun that clouds take (beta of "
-                                     "physics.md eq. 1). It is 0 where `dni_w_m2` is measured.")),
+      number<WeatherSample>("wind_m_s", "m s-1", between(limits::kWindMS), EMIT_FIELD(wind_m_s),
+                            "Wind speed. Without it the wind is that of `film_w_m2_k`, which is "
+                            "needed then."),
+      number<WeatherSample>("cloud_frac", "", between(limits::kCloudFrac), EMIT_FIELD(cloud_frac),
+                            "Share of the direct sun that clouds take (beta of physics.md eq. 1). "
+                            "It is 0 where `dni_w_m2` is measured."),
       number<WeatherSample>("environment_k", "K", between(limits::kEnvironmentK),
                             EMIT_FIELD(environment_k),
                             "Temperature of the surroundings. Without it emit2014 takes the air's, "

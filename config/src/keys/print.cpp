@@ -150,6 +150,12 @@ std::string print_scenario(const scene::ScenarioDesc& scenario) {
   return out;
 }
 
+std::string print_material(const scene::Material& material) {
+  std::string out;
+  print_section("[[material]]", material, material_keys(), out);
+  return out;
+}
+
 std::string print_daemon(const DaemonConfig& daemon) {
   std::string out;
   write_table(DaemonHead{daemon.scenario.string()}, daemon_head_keys(), out);

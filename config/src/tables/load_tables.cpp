@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include "emit/physics/clear_sky.hpp"
 #include "emit/physics/constants.hpp"
 #include "emit/physics/limits.hpp"
 #include "tables.hpp"
@@ -26,6 +27,17 @@ const Range kTime = between(-limits::kMaxSimTimeS, limits::kMaxSimTimeS);
 
 }  // namespace
 
+double wind_of_film_m_s(double film_w_m2_k) {
+  double lo_m_s = limits::kWindMS.lo;
+  double hi_m_s = limits::kWindMS.hi;
+  for (int i = 0; i < 60; ++i) {
+    const double middle_m_s = 0.5 * (lo_m_s + hi_m_s);
+    const bool below = physics::film_coefficient_w_m2_k(middle_m_s) < film_w_m2_k;
+    (below ? lo_m_s : hi_m_s) = middle_m_s;
+  }
+  return 0.5 * (lo_m_s + hi_m_s);
+}
+
 Result<std::vector<scene::WeatherSample>> load_weather_csv(const std::filesystem::path& file) {
   const Result<std::vector<TableRow>> rows =
       read_typed_table(file, {{"time_s", true, kTime},
@@ -33,8 +45,8 @@ Result<std::vector<scene::WeatherSample>> load_weather_csv(const std::filesystem
                               {"dhi_w_m2", true, between(limits::kDiffuseHorizontalWM2)},
                               {"longwave_down_w_m2", true, between(limits::kLongwaveDownWM2)},
                               {"air_k", true, between(limits::kAirK)},
-                              {"wind_m_s", true, between(limits::kWindMS)},
-                              {"cloud_frac", true, between(limits::kCloudFrac)},
+                              {"wind_m_s", false, between(limits::kWindMS)},
+                              {"cloud_frac", false, between(limits::kCloudFrac)},
                               {"environment_k", false, between(limits::kEnvironmentK)},
                               {"film_w_m2_k", false, between(limits::kFilmWM2K)}});
   if (!rows) {
@@ -48,10 +60,15 @@ Result<std::vector<scene::WeatherSample>> load_weather_csv(const std::filesystem
     sample.diffuse_horizontal_w_m2 = *row.numbers[2];
     sample.longwave_down_w_m2 = *row.numbers[3];
     sample.air_k = *row.numbers[4];
-    sample.wind_m_s = *row.numbers[5];
-    sample.cloud_frac = *row.numbers[6];
+    sample.cloud_frac = row.numbers[6].value_or(0.0);
     sample.environment_k = row.numbers[7];
     sample.film_w_m2_k = row.numbers[8];
+    if (!row.numbers[5] && !sample.film_w_m2_k) {
+      return make_error(
+          ErrorCode::config,
+          at_line(file, row, "'wind_m_s' is needed where 'film_w_m2_k' is not given"));
+    }
+    sample.wind_m_s = row.numbers[5] ? *row.numbers[5] : wind_of_film_m_s(*sample.film_w_m2_k);
     if (!out.empty() && sample.sim_time_ns <= out.back().sim_time_ns) {
       return make_error(ErrorCode::config,
                         at_line(file, row, "'time_s' is not later than in the row before"));

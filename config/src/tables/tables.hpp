@@ -10,6 +10,10 @@
 /// Readers of the CSV files that a scenario names.
 namespace emit::config {
 
+/// Returns the wind, m/s, for which the model of the wind gives a film, clamped to the winds that
+/// tables may have (load_tables.cpp).
+[[nodiscard]] double wind_of_film_m_s(double film_w_m2_k);
+
 // These are in load_tables.cpp. Times and wavelengths have to increase from row to row.
 // Errors: those of read_typed_table(); config, naming the row.
 [[nodiscard]] physics::Result<std::vector<scene::WeatherSample>> load_weather_csv(

@@ -288,15 +288,10 @@ physics::Result<void> Solving::solve_instant(double time_s) {
 
 physics::Result<void> Solving::write_tables() const {
   if (command_.at) {
-    const std::string table = probe_header() + table_;
-    if (command_.at_out == "-") {
-      fmt::print("{}", table);
-    } else {
-      auto file = ReplacingFile::create(command_.at_out);
-      if (!file) return tl::unexpected(std::move(file.error()));
-      if (auto done = file->write(table); !done) return done;
-      if (auto done = file->commit(); !done) return done;
-    }
+    auto file = ReplacingFile::create(command_.at_out);
+    if (!file) return tl::unexpected(std::move(file.error()));
+    if (auto done = file->write(probe_header() + table_); !done) return done;
+    if (auto done = file->commit(); !done) return done;
   }
   if (!command_.json) return {};
   const reference::SolveReport report = solver_->report();

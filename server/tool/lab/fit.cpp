@@ -3,20 +3,21 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 
 #include "emit/config/load.hpp"
 #include "emit/physics/csv.hpp"
-#include "emit/physics/nearest_name.hpp"
+#include "emit/scene/base.hpp"
 #include "tool/command_line/common_options.hpp"
+#include "tool/lab/fit_materials.hpp"
 #include "tool/lab/lab.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/json.hpp"
 #include "tool/support/library_edit.hpp"
 #include "tool/support/progress.hpp"
+#include "tool/support/replacing_file.hpp"
 #include "tool/support/scenario_input.hpp"
 
 namespace emit::tool {
@@ -31,6 +32,7 @@ struct FitOptions {
   double history_s = 12'600.0;
   std::filesystem::path library;  ///< empty: the shipped one
   std::optional<std::filesystem::path> out;
+  std::optional<std::filesystem::path> toml;
   std::optional<std::filesystem::path> json;
 };
 
@@ -115,13 +117,118 @@ bool is_curve(const std::string& input) {
   return std::filesystem::path(input).extension() == ".csv";
 }
 
-/// What a curve's material is looked up in: the shipped library.
-Result<scene::ScenarioDesc> library_scenario(const std::vector<std::string>& set) {
-  auto file = config::resolve_scenario("block-on-road");
-  if (!file) return tl::unexpected(std::move(file.error()));
+/// Materials to fit, and the curve or the forcing of a scenario that they are fitted to.
+struct FitInput {
+  std::vector<scene::Material> materials;
+  std::vector<reference::CurvePoint> curve;  ///< empty: the scenario's forcing counts
+  std::vector<reference::GroundForcing> forcing;
+  double start_s = 0.0;
+  double initial_k = 0.0;
+};
+
+/// Reads a curve and its material.
+Result<FitInput> curve_input(const FitOptions& command) {
+  const auto library = fit_library(command.library);
+  if (!library) return tl::unexpected(library.error());
+  const auto known = config::load_materials(*library, command.input.set);
+  if (!known) return tl::unexpected(known.error());
+  // A base that the library does not state follows from the place and date of a shipped scenario.
+  const auto file = config::resolve_scenario("block-on-road");
+  if (!file) return tl::unexpected(file.error());
   config::LoadOptions options;
   options.require_scene_files = false;
-  return config::load_scenario(*file, set, options);
+  auto scenario = config::load_scenario(*file, {}, options);
+  if (!scenario) return tl::unexpected(std::move(scenario.error()));
+  scenario->materials = *known;
+  scene::resolve_bases(*scenario);
+  FitInput input;
+  auto materials = fit_materials(scenario->materials, command.materials);
+  if (!materials) return tl::unexpected(std::move(materials.error()));
+  input.materials = std::move(*materials);
+  for (const scene::Material& material : input.materials) {
+    if (material.base_stated || material.prescribed_k) continue;
+    warn(fmt::format("material '{}' states no base_k: {:.1f} K is taken, that of block-on-road",
+                     material.name, material.base_k));
+  }
+  auto curve = read_curve(command.input.scenario);
+  if (!curve) return tl::unexpected(std::move(curve.error()));
+  input.curve = std::move(*curve);
+  return input;
+}
+
+/// Reads a scenario and makes the forcing of its histories.
+Result<FitInput> scenario_input(const FitOptions& command) {
+  const auto scenario = load_scenario_choice(command.input);
+  if (!scenario) return tl::unexpected(scenario.error());
+  for (const std::string& text : scenario->warnings) warn(text);
+  FitInput input;
+  auto materials = fit_materials(scenario->materials, command.materials);
+  if (!materials) return tl::unexpected(std::move(materials.error()));
+  input.materials = std::move(*materials);
+  constexpr double kForcingStepS = 60.0;
+  input.start_s = static_cast<double>(scenario->thermal.history_start_ns) * 1e-9;
+  input.initial_k = scenario->thermal.initial_k;
+  input.forcing = reference::ground_forcing(*scenario, input.start_s - command.spin_up_s,
+                                            input.start_s + command.history_s, kForcingStepS);
+  return input;
+}
+
+int fail_input(const physics::Error& error) {
+  return error.code == ErrorCode::config ? fail_config(error) : fail_call(error);
+}
+
+/// Fits and their texts.
+struct FitOutput {
+  TextTable table{{"material", "rms K", "max K", "derived rms K", "max K", "modes"}};
+  Json results = Json::array();
+  std::vector<LibraryEntry> entries;
+  std::string toml;
+};
+
+/// Fits every material. Errors: those of the fit.
+Result<FitOutput> fit_all(const FitInput& input, const reference::FitOptions& options) {
+  const bool foster = options.model == reference::FitModel::foster;
+  FitOutput out;
+  Progress bar("fitting", input.materials.size());
+  for (std::size_t i = 0; i < input.materials.size(); ++i) {
+    const scene::Material& material = input.materials[i];
+    const auto fit = !input.curve.empty()
+                         ? reference::fit_curve(material, input.curve, options)
+                         : reference::fit_material(material, input.forcing, input.start_s,
+                                                   input.initial_k, options);
+    if (!fit) {
+      bar.finish();
+      return tl::unexpected(fit.error());
+    }
+    bar.advance_to(i + 1);
+    out.table.add({material.name + (material.dry_layers_valid ? "" : " (dry layers not valid)"),
+                   fmt::format("{:.3f}", fit->rms_k), fmt::format("{:.3f}", fit->max_k),
+                   foster ? fmt::format("{:.3f}", fit->derived_rms_k) : "-",
+                   foster ? fmt::format("{:.3f}", fit->derived_max_k) : "-", modes_text(*fit)});
+    out.results.push(json_of(*fit, material, options.model));
+    out.entries.push_back({*fit, foster});
+    out.toml += fitted_material_toml(material, *fit, foster);
+  }
+  bar.finish();
+  return out;
+}
+
+/// Writes the files that were asked for.
+Result<void> write_files(const FitOptions& command, FitOutput& output) {
+  if (command.out) {
+    auto done = write_library(command.library, output.entries, *command.out);
+    if (!done) return done;
+  }
+  if (command.toml) {
+    auto file = ReplacingFile::create(*command.toml);
+    if (!file) return tl::unexpected(std::move(file.error()));
+    if (auto done = file->write(output.toml); !done) return done;
+    if (auto done = file->commit(); !done) return done;
+  }
+  if (!command.json) return {};
+  Json json = Json::object();
+  json.set("scenario", command.input.scenario).set("results", std::move(output.results));
+  return write_json(*command.json, json);
 }
 
 int run(const FitOptions& command) {
@@ -131,89 +238,31 @@ int run(const FitOptions& command) {
   const bool foster = options.model == reference::FitModel::foster;
   options.modes = command.modes.value_or(foster ? 4U : 2U);
   if (!foster && options.modes > 2) return fail(kExitUsage, "emit2014 has at most 2 modes");
-
-  const bool curve_input = is_curve(command.input.scenario);
-  if (curve_input && command.materials.size() != 1) {
-    return fail(kExitUsage, "a curve belongs to one material: name it with --material");
-  }
-  auto scenario =
-      curve_input ? library_scenario(command.input.set) : load_scenario_choice(command.input);
-  if (!scenario) return fail_config(scenario.error());
-  for (const std::string& text : scenario->warnings) warn(text);
-
-  std::vector<const scene::Material*> materials;
-  for (const std::string& name : command.materials) {
-    const auto found = std::find_if(scenario->materials.begin(), scenario->materials.end(),
-                                    [&](const scene::Material& m) { return m.name == name; });
-    if (found == scenario->materials.end()) {
-      std::vector<std::string> known;
-      for (const scene::Material& m : scenario->materials) known.push_back(m.name);
-      return fail(kExitUsage, fmt::format("there is no material '{}'{}", name,
-                                          physics::did_you_mean(name, known)));
-    }
-    materials.push_back(&*found);
-  }
-  if (command.materials.empty()) {
-    for (const scene::Material& material : scenario->materials) {
-      if (!material.prescribed_k) materials.push_back(&material);
-    }
-  }
-
-  std::vector<reference::CurvePoint> curve;
-  std::vector<reference::GroundForcing> forcing;
-  const double start_s = static_cast<double>(scenario->thermal.history_start_ns) * 1e-9;
   options.history_s = command.history_s;
   options.spin_up_s = command.spin_up_s;
-  if (curve_input) {
-    auto read = read_curve(command.input.scenario);
-    if (!read) return fail_call(read.error());
-    curve = std::move(*read);
-  } else {
-    constexpr double kForcingStepS = 60.0;
-    forcing = reference::ground_forcing(*scenario, start_s - options.spin_up_s,
-                                        start_s + options.history_s, kForcingStepS);
+  const bool curve = is_curve(command.input.scenario);
+  if (curve && command.materials.size() != 1) {
+    return fail(kExitUsage, "a curve belongs to one material: name it with --material");
   }
-
-  TextTable table({"material", "rms K", "max K", "derived rms K", "max K", "modes"});
-  Json results = Json::array();
-  std::vector<LibraryEntry> entries;
-  Progress bar("fitting", materials.size());
-  for (std::size_t i = 0; i < materials.size(); ++i) {
-    const scene::Material& material = *materials[i];
-    const auto fit = curve_input ? reference::fit_curve(material, curve, options)
-                                 : reference::fit_material(material, forcing, start_s,
-                                                           scenario->thermal.initial_k, options);
-    if (!fit) {
-      bar.finish();
-      return fail_call(fit.error());
-    }
-    bar.advance_to(i + 1);
-    table.add({material.name + (material.dry_layers_valid ? "" : " (dry layers not valid)"),
-               fmt::format("{:.3f}", fit->rms_k), fmt::format("{:.3f}", fit->max_k),
-               foster ? fmt::format("{:.3f}", fit->derived_rms_k) : "-",
-               foster ? fmt::format("{:.3f}", fit->derived_max_k) : "-", modes_text(*fit)});
-    results.push(json_of(*fit, material, options.model));
-    entries.push_back({*fit, foster});
+  const auto input = curve ? curve_input(command) : scenario_input(command);
+  if (!input) return fail_input(input.error());
+  if (command.out) {
+    const auto library = fit_library(command.library);
+    if (!library) return fail(library.error());
+    const auto good = check_fit_library(*library, input->materials, command.input.scenario);
+    if (!good) return fail_input(good.error());
   }
-  bar.finish();
-  std::FILE* text = text_stream(command.json);
-  fmt::print(text, "{}", table.to_string());
-  if (!curve_input) {
+  auto output = fit_all(*input, options);
+  if (!output) return fail_call(output.error());
+  std::FILE* text = command.toml == "-" ? stderr : text_stream(command.json);
+  fmt::print(text, "{}", output->table.to_string());
+  if (!curve) {
     fmt::print(text,
                "worst of five histories of {:.0f} s from {:.0f} s on, after {:.0f} s of "
                "spin-up; reference within {:.0e} K a step\n",
-               options.history_s, start_s, options.spin_up_s, options.reference_tolerance_k);
+               options.history_s, input->start_s, options.spin_up_s, options.reference_tolerance_k);
   }
-  if (command.out) {
-    if (auto ok = write_library(command.library, entries, *command.out); !ok) {
-      return fail(ok.error());
-    }
-  }
-  if (command.json) {
-    Json json = Json::object();
-    json.set("scenario", command.input.scenario).set("results", std::move(results));
-    if (auto ok = write_json(*command.json, json); !ok) return fail(ok.error());
-  }
+  if (auto done = write_files(command, *output); !done) return fail(done.error());
   return kExitOk;
 }
 
@@ -240,8 +289,17 @@ void add_options(CommandLine& line, FitOptions& options) {
   line.seconds("--history-s", options.history_s, "Length of a history")
       .in_range(600.0, 864'000.0)
       .show_default();
-  line.path("--library", options.library, "Library to start from; default: the shipped one");
-  line.output_file("--out", options.out, "Library to write: the same with the fitted modes");
+  line.path(
+      "--library", options.library,
+      "Library that --out starts from and that a curve's material is of; default: the shipped "
+      "one");
+  line.output_file(
+      "--out", options.out,
+      "Library to write: that of --library with the fitted modes of its own materials");
+  line.output_file(
+      "--toml", options.toml,
+      "Tables [[material]] with the fitted modes, to paste into a scenario or library; "
+      "-: standard output");
   add_json(line, options.json);
 }
 

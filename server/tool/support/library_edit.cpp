@@ -31,6 +31,16 @@ bool assigns(std::string_view line, std::string_view key) {
   return rest.starts_with("=");
 }
 
+/// Returns true if the value of a line is a name, in either spelling of TOML.
+bool is_name(std::string_view value, const std::string& name) {
+  std::string quoted = "\"";
+  for (const char c : name) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    quoted += c;
+  }
+  return value == quoted + '"' || value == "'" + name + "'";
+}
+
 /// Returns the end of a value that begins at line `begin`: brackets must balance. Strings in
 /// library values hold none.
 std::size_t value_end(const std::vector<std::string>& lines, std::size_t begin) {
@@ -113,10 +123,10 @@ Result<std::string> with_fitted_modes(const std::string& library,
       }
       std::size_t end = begin + 1;
       while (end < lines.size() && !trimmed(lines[end]).starts_with("[[")) ++end;
-      const std::string wanted = fmt::format("\"{}\"", entry.fit.material);
       for (std::size_t i = begin + 1; i < end; ++i) {
         if (assigns(lines[i], "name") &&
-            trimmed(std::string_view(lines[i]).substr(lines[i].find('=') + 1)) == wanted) {
+            is_name(trimmed(std::string_view(lines[i]).substr(lines[i].find('=') + 1)),
+                    entry.fit.material)) {
           replace_in_block(lines, begin + 1, end, entry);
           found = true;
           break;

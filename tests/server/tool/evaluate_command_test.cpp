@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <sstream>
+#include <string>
 
 #include "support/emit_process.hpp"
 
@@ -80,6 +81,77 @@ TEST(CliEvaluate, the_shader_agrees_with_double_to_a_millikelvin) {
   for (std::size_t i = 1; i < exact.size(); ++i) {
     EXPECT_NEAR(std::stod(shader[i]), std::stod(exact[i]), 1e-3) << "row " << i;
   }
+}
+
+/// Material of a scenario with the name of one of the library, but with other layers.
+const std::string kInline =
+    "[[material]]\nname = \"asphalt\"\nsolar_absorptance_frac = 0.9\nemissivity_frac = 0.9\n"
+    "base_k = 290\nlayers = [{ thickness_m = 0.02, conductivity_w_m_k = 0.7, density_kg_m3 = "
+    "2000, specific_heat_j_kg_k = 900 }]\n[[material]]\nname = 'odd \"name\" \\ [x]'\n"
+    "solar_absorptance_frac = 0.9\nemissivity_frac = 0.9\nbase_k = 290\nlayers = [{ thickness_m = "
+    "0.05, conductivity_w_m_k = 0.7, density_kg_m3 = 2000, specific_heat_j_kg_k = 900 }]\n";
+
+std::vector<std::string> quick_fit(const std::string& scenario, std::vector<std::string> more) {
+  std::vector<std::string> arguments{"fit",         scenario, "--modes",     "2",
+                                     "--spin-up-s", "7200",   "--history-s", "12600"};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+
+TEST(CliFit, tables_to_paste_bring_the_fitted_modes_back_for_any_name) {
+  const TemporaryFolder folder;
+  const std::string scenario = folder.file("s.toml");
+  write_text(scenario,
+             "epoch_utc = 2014-06-21T06:00:00Z\n[place]\nlat_deg = 48\nlon_deg = 11\n" + kInline);
+  const std::string odd = "odd \"name\" \\ [x]";
+  const ProcessResult fit = run_emit(quick_fit(scenario, {"--material", odd, "--toml", "-"}));
+  ASSERT_EQ(fit.exit_code, 0) << fit.err;
+  EXPECT_NE(fit.out.find("foster_fit"), std::string::npos) << fit.out;
+  EXPECT_EQ(fit.out.find("rms K"), std::string::npos) << fit.out;
+  // The table takes the place of the scenario's own and gives the same modes again.
+  write_text(folder.file("lib.toml"), fit.out);
+  const ProcessResult again = run_emit(
+      quick_fit(scenario, {"--material", odd, "--library", folder.file("lib.toml"), "--out",
+                           folder.file("out.toml"), "--toml", folder.file("again.toml")}));
+  ASSERT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_EQ(read_text(folder.file("again.toml")), fit.out);
+  EXPECT_NE(read_text(folder.file("out.toml")).find("foster_fit"), std::string::npos);
+}
+
+TEST(CliFit, modes_of_another_material_of_the_name_stay_out_of_the_library) {
+  const TemporaryFolder folder;
+  const std::string scenario = folder.file("s.toml");
+  write_text(scenario,
+             "epoch_utc = 2014-06-21T06:00:00Z\n[place]\nlat_deg = 48\nlon_deg = 11\n" + kInline);
+  const ProcessResult fit =
+      run_emit(quick_fit(scenario, {"--material", "asphalt", "--out", folder.file("out.toml")}));
+  EXPECT_EQ(fit.exit_code, 2) << fit.err;
+  EXPECT_NE(fit.err.find("'asphalt'"), std::string::npos) << fit.err;
+  EXPECT_NE(fit.err.find("--toml"), std::string::npos) << fit.err;
+  const ProcessResult missing = run_emit(
+      quick_fit(scenario, {"--material", "odd \"name\" \\ [x]", "--out", folder.file("out.toml")}));
+  EXPECT_EQ(missing.exit_code, 2) << missing.err;
+  EXPECT_NE(missing.err.find("is not in"), std::string::npos) << missing.err;
+  const ProcessResult good = run_emit(
+      quick_fit("block-on-road", {"--material", "asphalt", "--out", folder.file("out.toml")}));
+  EXPECT_EQ(good.exit_code, 0) << good.err;
+}
+
+TEST(CliFit, a_curve_takes_its_material_from_the_library_that_is_given) {
+  const TemporaryFolder folder;
+  write_text(folder.file("lib.toml"), kInline);
+  std::string curve = "time_s,absorbed_w_m2,film_w_m2_k,air_k,temperature_k\n";
+  for (int i = 0; i <= 60; ++i) {
+    curve += std::to_string(i * 120) + ",700,15,290," + std::to_string(290.0 + 0.2 * i) + "\n";
+  }
+  write_text(folder.file("c.csv"), curve);
+  const ProcessResult fit =
+      run_emit({"fit", folder.file("c.csv"), "--material", "odd \"name\" \\ [x]", "--library",
+                folder.file("lib.toml"), "--modes", "2"});
+  EXPECT_EQ(fit.exit_code, 0) << fit.err;
+  const ProcessResult shipped =
+      run_emit({"fit", folder.file("c.csv"), "--material", "odd \"name\" \\ [x]"});
+  EXPECT_EQ(shipped.exit_code, 2) << shipped.err;
 }
 
 }  // namespace

@@ -60,7 +60,7 @@ const std::vector<OutputCase>& output_cases() {
         {"--out", "--json"});
     add({"log", "export", "csv", "no.mcap"}, {}, {"--out"});
     add({"log", "export", "exr", "no.mcap", "--out", "GOOD"}, {"--json"}, {"--out"});
-    add({"fit", "block-on-road"}, {"--out", "--json"});
+    add({"fit", "block-on-road"}, {"--out", "--toml", "--json"});
     add({"generate", "box", "--out", "GOOD"}, {}, {"--out"});
     add({"make-log", "airfield", "--out", "GOOD"}, {"--out"});
     add({"export", "gnss", "no.mcap", "--scenario", "box", "--format", "nmea", "--out", "GOOD"},

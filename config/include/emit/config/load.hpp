@@ -39,6 +39,11 @@ struct LoadOptions {
     const std::filesystem::path& file, std::span<const std::string> overrides = {},
     const LoadOptions& options = {});
 
+/// Reads and checks a library of materials. Overrides address its materials alone
+/// (`material[concrete].base_k=290`). Errors: config, with one line per fault; not_found.
+[[nodiscard]] physics::Result<std::vector<scene::Material>> load_materials(
+    const std::filesystem::path& file, std::span<const std::string> overrides = {});
+
 /// Reads and checks the configuration of emitd. The scenario that it names is found, but not read.
 /// Errors: as of load_scenario().
 [[nodiscard]] physics::Result<DaemonConfig> load_daemon(const std::filesystem::path& file,
@@ -49,6 +54,8 @@ struct LoadOptions {
 /// Tables from CSV files stand in the text.
 [[nodiscard]] std::string print_scenario(const scene::ScenarioDesc& scenario);
 [[nodiscard]] std::string print_daemon(const DaemonConfig& daemon);
+/// Material as the table of a scenario or of a library, to paste there.
+[[nodiscard]] std::string print_material(const scene::Material& material);
 
 /// Key of an effective configuration, as `--set` takes it, and its value in the spelling of TOML.
 struct ConfigValue {
