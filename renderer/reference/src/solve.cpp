@@ -31,6 +31,9 @@ using physics::Result;
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
+/// Longest time on the fine grid before the first picture. Edges of older shadows have faded.
+constexpr std::int64_t kFineNs = 24LL * 3600 * 1'000'000'000;
+
 /// First hit of a pixel's ray.
 struct PixelHit {
   std::uint32_t pixel = 0;
@@ -86,6 +89,7 @@ struct SceneSolver::Data {
   bool resumed = false;
   bool stopped = false;
   double spin_up_s = 0.0;
+  PointSolution points;  ///< of the last instant, in one dimension
   std::string reason;
   std::vector<std::string> notes;
 
@@ -179,10 +183,12 @@ Result<void> SceneSolver::Data::choose_dimension(bool& three) {
   }
   if (three) return {};
   // Name the keys that one dimension cannot follow.
-  if (scenario.thermal.exchange) {
+  const bool moving = std::ranges::any_of(
+      geometry.instances, [](const scene::Instance& instance) { return instance.entity_id != 0; });
+  if (scenario.thermal.exchange && moving) {
     notes.emplace_back(
-        "in one dimension thermal.exchange has no effect: other surfaces count as surroundings of "
-        "environment temperature");
+        "in one dimension thermal.exchange leaves moving objects out: they and what they see count "
+        "as surroundings of environment temperature");
   }
   if (!scenario.contacts.empty()) {
     notes.emplace_back("in one dimension [[contact]] has no effect: no body conducts to another");
@@ -195,8 +201,14 @@ Result<void> SceneSolver::Data::choose_dimension(bool& three) {
 void SceneSolver::Data::lengthen_history(bool three) {
   scene::ThermalOptions& thermal = scenario.thermal;
   if (thermal.spin_up_ns <= 0) return;
+  // Three dimensions take all but the last day on the coarse grid and in longer steps.
+  const std::int64_t fine_ns =
+      three ? std::max(thermal.history_start_ns, std::min(options.first_ns, end_ns) - kFineNs)
+            : thermal.history_start_ns;
+  const std::int64_t shift_ns = fine_ns - thermal.history_start_ns;
+  thermal.history_start_ns = fine_ns;
   thermal.spin_up_ns =
-      std::max<std::int64_t>(thermal.spin_up_ns, std::llround(options.spin_up_s * 1e9));
+      std::max<std::int64_t>(thermal.spin_up_ns + shift_ns, std::llround(options.spin_up_s * 1e9));
   spin_up_s = static_cast<double>(thermal.spin_up_ns) / 1e9;
   if (three) return;
   thermal.history_start_ns -= thermal.spin_up_ns;
@@ -347,6 +359,14 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
             e * band.black(face_k[f]) + (1.0 - e) * (sky * band.sky_mean() + (1.0 - sky) * around);
       });
       patch = solid->radiation().exchange().patch_means(leaving);
+    } else {
+      for (std::size_t p = 0; p < points.patches.size(); ++p) {
+        const double e = band.emissivity(geometry.materials[points.patch_material[p]]);
+        const PatchState& state = points.patches[p];
+        patch.push_back(e * band.black(state.temperature_k) +
+                        (1.0 - e) *
+                            (state.sky_frac * band.sky_mean() + (1.0 - state.sky_frac) * around));
+      }
     }
     std::vector<float>& plane = image.radiance_w_m2_sr[b];
     threads::parallel_indices(std::size_t{0}, hits.size(), [&](std::size_t i) {
@@ -359,6 +379,10 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
       if (solid) {
         for (const SceneExchange::Link& link : solid->radiation().links(hit.face)) {
           incoming += static_cast<double>(link.share_frac) * patch[link.patch];
+        }
+      } else {
+        for (const SightLink& link : points.sights[i].links) {
+          incoming += link.share_frac * patch[link.patch];
         }
       }
       // Add emission and reflection, then pass the air to the camera.
@@ -409,12 +433,15 @@ Result<std::vector<double>> SceneSolver::Data::temperatures(std::vector<PixelHit
   }
   const PointHistories histories(scenario, geometry, *rays, *climate, options.rays,
                                  scenario.thermal.history_start_ns + std::llround(spin_up_s * 1e9));
-  std::vector<SolvePoint> points;
-  for (const PixelHit& hit : hits) points.push_back(hit.point);
-  return histories.temperatures(points, sim_time_ns, [&](double share) {
+  std::vector<SolvePoint> places;
+  for (const PixelHit& hit : hits) places.push_back(hit.point);
+  auto solved = histories.temperatures(places, sim_time_ns, [&](double share) {
     stopped = options.progress && !options.progress(share);
     return !stopped;
   });
+  if (!solved) return tl::unexpected(std::move(solved.error()));
+  points = std::move(*solved);
+  return points.kelvin;
 }
 
 Result<SolvedImage> SceneSolver::image(const SolveView& view) {
@@ -441,7 +468,9 @@ Result<SolvedImage> SceneSolver::image(const SolveView& view) {
                              .sky_view({hits[i].point.position_world_m, hits[i].point.normal, 1e-9},
                                        d.options.rays)
                              .sky_cosine.value_frac;
-      hits[i].ground_frac = 1.0 - hits[i].sky_frac;
+      double known_frac = hits[i].sky_frac;
+      for (const SightLink& link : d.points.sights[i].links) known_frac += link.share_frac;
+      hits[i].ground_frac = std::max(0.0, 1.0 - known_frac);
     });
   }
   if (now.direct_normal_w_m2 > 0.0) {
@@ -561,7 +590,10 @@ Result<std::vector<SolvedImage>> solve(const scene::ScenarioDesc& scenario,
   });
   std::vector<SolvedImage> images(views.size());
   if (views.empty()) return images;
-  auto solver = SceneSolver::create(scenario, geometry, options, views[order.back()].sim_time_ns);
+  SolveOptions with_first = options;
+  with_first.first_ns = views[order.front()].sim_time_ns;
+  auto solver =
+      SceneSolver::create(scenario, geometry, with_first, views[order.back()].sim_time_ns);
   if (!solver) return tl::unexpected(std::move(solver.error()));
   for (const std::size_t i : order) {
     if (auto reached = solver->advance_to(views[i].sim_time_ns); !reached) {

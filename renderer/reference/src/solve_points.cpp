@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "solve_points.hpp"
-#include "emit/threads/parallel.hpp"
 
 #include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
@@ -12,6 +11,9 @@
 #include <limits>
 #include <map>
 #include <utility>
+
+#include "emit/threads/parallel.hpp"
+#include "solve_sight.hpp"
 
 namespace emit::reference {
 namespace {
@@ -30,6 +32,9 @@ constexpr std::int64_t kMovingStepNs = 4 * kSecondNs;
 constexpr std::int64_t kShortestStaticNs = 4 * kSecondNs;
 constexpr std::int64_t kShortestMovingNs = kSecondNs / 2;
 constexpr double kEvenFrac = 0.02;
+/// Rays for the scenery in the view: one for so many of those for the sky, and at least so many.
+constexpr std::uint32_t kRaysPerSightRay = 4;
+constexpr std::uint32_t kLeastSightRays = 16;
 /// Distance beyond which an entity does not change a point's view of the sky.
 constexpr double kEntityReachM = 25.0;
 
@@ -216,68 +221,194 @@ void PointHistories::choose_nodes(std::int64_t until_ns,
   }
 }
 
-/// Computes the views of a point at the nodes and between them.
-std::vector<ViewSample> PointHistories::views(const SolvePoint& point,
-                                              std::span<const std::int64_t> nodes_ns,
-                                              std::span<const SceneInstant> instants,
-                                              std::int64_t sim_time_ns) const {
-  return PointViews(scene_, climate_, point, rays_, sim_time_ns).run(nodes_ns, instants);
+/// Solution of one instant: nodes, meshes and solvers that its points share.
+class PointHistories::Run {
+ public:
+  Run(const PointHistories& all, std::int64_t sim_time_ns) : all_(all), sim_time_ns_(sim_time_ns) {
+    all.choose_nodes(sim_time_ns, nodes_ns_);
+    instants_.reserve(nodes_ns_.size());
+    for (const std::int64_t t : nodes_ns_) instants_.push_back(all.scene_.at(t));
+  }
+
+  [[nodiscard]] std::span<const std::int64_t> nodes_ns() const noexcept { return nodes_ns_; }
+
+  /// Builds one mesh per material. Errors: those of material_mesh().
+  Result<void> add_meshes(std::span<const SolvePoint> points) {
+    for (const SolvePoint& point : points) {
+      const scene::Material& material = all_.geometry_.materials[point.material];
+      if (material.prescribed_k || meshes_.contains(point.material)) continue;
+      auto mesh = material_mesh(material);
+      if (!mesh) return tl::unexpected(std::move(mesh.error()));
+      meshes_.emplace(point.material, std::move(*mesh));
+    }
+    return {};
+  }
+
+  /// Returns the rays of the scenery in the view of a point at the instant of the solution.
+  [[nodiscard]] std::vector<HemisphereRay> rays_of(const SolvePoint& point) const {
+    std::vector<HemisphereRay> rays(std::max(kLeastSightRays, all_.rays_ / kRaysPerSightRay));
+    instants_.back().hemisphere({point.position_world_m, point.normal, 1e-9}, rays);
+    return rays;
+  }
+
+  /// Computes the temperatures of a point at times that ascend. `sees` and `back_sees` are what the
+  /// point and its back see of `patches`. Returns the views of the front.
+  std::vector<ViewSample> solve(const SolvePoint& point, const PatchHistories* patches,
+                                const PointSight& sees, const PointSight& back_sees,
+                                std::span<const std::int64_t> times_ns, std::span<double> out_k) {
+    const scene::Material& material = all_.geometry_.materials[point.material];
+    std::vector<ViewSample> front = views(point);
+    if (patches != nullptr) patches->add_to(front, sees);
+    if (material.prescribed_k) {
+      std::ranges::fill(out_k, *material.prescribed_k);
+      return front;
+    }
+    std::vector<ViewSample> back;
+    if (material.sheet) {
+      SolvePoint behind = point;
+      behind.normal = -point.normal;
+      back = views(behind);
+      if (patches != nullptr) patches->add_to(back, back_sees);
+    }
+    // Keep one solver per thread and material.
+    auto& mine = solvers_.local();
+    const auto solver = mine.try_emplace(point.material, all_.climate_, meshes_.at(point.material),
+                                         material, all_.scenario_.thermal.initial_k)
+                            .first;
+    solver->second.run(point.normal, {front, back}, times_ns, out_k);
+    return front;
+  }
+
+  /// Computes the radiation of a patch at all nodes, and its last state.
+  void solve_patch(const SolvePoint& place, const PatchHistories* patches, const PointSight& sees,
+                   const PointSight& back_sees, std::span<PatchRadiation> out, PatchState& last) {
+    std::vector<double> kelvin(nodes_ns_.size());
+    const std::vector<ViewSample> seen = solve(place, patches, sees, back_sees, nodes_ns_, kelvin);
+    const scene::Material& material = all_.geometry_.materials[place.material];
+    const SurfaceOptics optics{place.normal, material.solar_absorptance_frac,
+                               material.emissivity_frac};
+    auto view = seen.begin();
+    for (std::size_t node = 0; node < nodes_ns_.size(); ++node) {
+      while (view->time_ns < nodes_ns_[node] && view + 1 != seen.end()) ++view;
+      out[node] = patch_radiation(all_.climate_.at(nodes_ns_[node]), optics, *view,
+                                  all_.climate_.surroundings_reflectance_frac(), kelvin[node]);
+    }
+    last = {kelvin.back(), seen.back().sky_frac};
+  }
+
+ private:
+  /// Computes the views of a point at the nodes and between them.
+  [[nodiscard]] std::vector<ViewSample> views(const SolvePoint& point) const {
+    return PointViews(all_.scene_, all_.climate_, point, all_.rays_, sim_time_ns_)
+        .run(nodes_ns_, instants_);
+  }
+
+  const PointHistories& all_;
+  std::int64_t sim_time_ns_;
+  std::vector<std::int64_t> nodes_ns_;
+  std::vector<SceneInstant> instants_;
+  std::map<std::uint32_t, LayerMesh> meshes_;
+  tbb::enumerable_thread_specific<std::map<std::uint32_t, PointSolver>> solvers_;
+};
+
+namespace {
+
+/// Runs `body` for every index below `count` in portions, in parallel, and reports after each with
+/// the share done, which goes from `from` to `to`. Returns false if `done` stopped it.
+template <class Body>
+bool in_portions(std::size_t count, double from, double to, const std::function<bool(double)>& done,
+                 Body body) {
+  const std::size_t portion = std::max<std::size_t>(64, count / 100);
+  for (std::size_t begin = 0; begin < count; begin += portion) {
+    const std::size_t end = std::min(count, begin + portion);
+    threads::parallel_ranges(tbb::blocked_range<std::size_t>(begin, end, 4),
+                             [&](const auto& range) {
+                               for (std::size_t i = range.begin(); i != range.end(); ++i) body(i);
+                             });
+    const double share = static_cast<double>(end) / static_cast<double>(count);
+    if (done && !done(from + (to - from) * share)) return false;
+  }
+  return true;
 }
 
-Result<std::vector<double>> PointHistories::temperatures(
-    std::span<const SolvePoint> points, std::int64_t sim_time_ns,
-    const std::function<bool(double)>& done) const {
-  std::vector<std::int64_t> nodes_ns;
-  choose_nodes(sim_time_ns, nodes_ns);
-  std::vector<SceneInstant> instants;
-  instants.reserve(nodes_ns.size());
-  for (const std::int64_t t : nodes_ns) instants.push_back(scene_.at(t));
+/// Returns a point as its back sees it.
+SolvePoint back_of(SolvePoint point) {
+  point.normal = -point.normal;
+  return point;
+}
 
-  // Build one mesh per material.
-  std::map<std::uint32_t, LayerMesh> meshes;
-  for (const SolvePoint& point : points) {
-    const scene::Material& material = geometry_.materials[point.material];
-    if (material.prescribed_k || meshes.contains(point.material)) continue;
-    auto mesh = material_mesh(material);
-    if (!mesh) return tl::unexpected(std::move(mesh.error()));
-    meshes.emplace(point.material, std::move(*mesh));
-  }
+}  // namespace
 
-  // Solve the points in portions, in parallel, and report the progress after each.
-  std::vector<double> kelvin(points.size(), std::numeric_limits<double>::quiet_NaN());
-  tbb::enumerable_thread_specific<std::map<std::uint32_t, PointSolver>> solvers;
-  const std::size_t portion = std::max<std::size_t>(64, points.size() / 100);
-  for (std::size_t begin = 0; begin < points.size(); begin += portion) {
-    const std::size_t end = std::min(points.size(), begin + portion);
-    threads::parallel_ranges(
-        tbb::blocked_range<std::size_t>(begin, end, 4), [&](const auto& range) {
-          for (std::size_t i = range.begin(); i != range.end(); ++i) {
-            const SolvePoint& point = points[i];
-            const scene::Material& material = geometry_.materials[point.material];
-            if (material.prescribed_k) {
-              kelvin[i] = *material.prescribed_k;
-              continue;
-            }
-            // Keep one solver per thread and material.
-            auto& mine = solvers.local();
-            const auto solver =
-                mine.try_emplace(point.material, climate_, meshes.at(point.material), material,
-                                 scenario_.thermal.initial_k)
-                    .first;
-            const std::vector<ViewSample> front = views(point, nodes_ns, instants, sim_time_ns);
-            std::vector<ViewSample> back;
-            if (material.sheet) {
-              SolvePoint behind = point;
-              behind.normal = -point.normal;
-              back = views(behind, nodes_ns, instants, sim_time_ns);
-            }
-            solver->second.run(point.normal, {front, back}, std::span(&sim_time_ns, 1),
-                               std::span(&kelvin[i], 1));
-          }
-        });
-    if (done && !done(static_cast<double>(end) / static_cast<double>(points.size()))) break;
+/// Finds what points and the backs of sheets see. Traces portions in parallel and numbers the
+/// patches in the order of the points.
+void PointHistories::trace_sights(const Run& run, std::span<const SolvePoint> points,
+                                  SightBuilder& sight, std::span<PointSight> front,
+                                  std::span<PointSight> back) const {
+  constexpr std::size_t kPortion = 512;
+  std::vector<std::vector<HemisphereRay>> rays(kPortion);
+  std::vector<std::vector<HemisphereRay>> back_rays(kPortion);
+  for (std::size_t begin = 0; begin < points.size(); begin += kPortion) {
+    const std::size_t end = std::min(points.size(), begin + kPortion);
+    threads::parallel_indices(begin, end, [&](std::size_t i) {
+      const bool sheet = geometry_.materials[points[i].material].sheet;
+      rays[i - begin] = run.rays_of(points[i]);
+      back_rays[i - begin] = sheet ? run.rays_of(back_of(points[i])) : std::vector<HemisphereRay>();
+    });
+    for (std::size_t i = begin; i < end; ++i) {
+      front[i] = sight.add(points[i], rays[i - begin]);
+      back[i] = sight.add(points[i], back_rays[i - begin]);
+    }
   }
-  return kelvin;
+}
+
+Result<PointSolution> PointHistories::temperatures(std::span<const SolvePoint> points,
+                                                   std::int64_t sim_time_ns,
+                                                   const std::function<bool(double)>& done) const {
+  Run run(*this, sim_time_ns);
+  if (auto built = run.add_meshes(points); !built) return tl::unexpected(std::move(built.error()));
+  PointSolution solution;
+  solution.kelvin.assign(points.size(), std::numeric_limits<double>::quiet_NaN());
+  solution.sights.resize(points.size());
+  std::vector<PointSight> back_sights(points.size());
+  SightBuilder sight;
+  const bool exchange = scenario_.thermal.exchange;
+  if (exchange) trace_sights(run, points, sight, solution.sights, back_sights);
+  // The patches see further patches, which take their surroundings for all that they see.
+  const std::size_t seen = sight.patches().size();
+  const std::vector<SolvePoint> near_places = sight.patches();
+  std::vector<PointSight> patch_sights(seen);
+  std::vector<PointSight> patch_back_sights(seen);
+  if (exchange) trace_sights(run, near_places, sight, patch_sights, patch_back_sights);
+  const std::vector<SolvePoint>& places = sight.patches();
+  if (auto built = run.add_meshes(places); !built) return tl::unexpected(std::move(built.error()));
+  PatchHistories far_patches(run.nodes_ns(), places.size());
+  PatchHistories patches(run.nodes_ns(), seen);
+  // Solve the patches without others, those that the points see with them, then the points.
+  const auto work = static_cast<double>(places.size() + seen + points.size());
+  const double first = static_cast<double>(places.size()) / std::max(1.0, work);
+  const double second = static_cast<double>(places.size() + seen) / std::max(1.0, work);
+  const bool all_patches = in_portions(places.size(), 0.0, first, done,
+                                       [&](std::size_t i) {
+                                         run.solve_patch(places[i], nullptr, {}, {},
+                                                         far_patches.of(i), far_patches.last(i));
+                                       }) &&
+                           in_portions(seen, first, second, done, [&](std::size_t i) {
+                             run.solve_patch(places[i], &far_patches, patch_sights[i],
+                                             patch_back_sights[i], patches.of(i), patches.last(i));
+                           });
+  if (!all_patches) {
+    solution.sights.assign(points.size(), {});
+    return solution;
+  }
+  in_portions(points.size(), second, 1.0, done, [&](std::size_t i) {
+    run.solve(points[i], &patches, solution.sights[i], back_sights[i], std::span(&sim_time_ns, 1),
+              std::span(&solution.kelvin[i], 1));
+  });
+  for (std::size_t i = 0; i < seen; ++i) {
+    solution.patch_material.push_back(places[i].material);
+    solution.patches.push_back(patches.last(i));
+  }
+  return solution;
 }
 
 }  // namespace emit::reference

@@ -20,8 +20,37 @@ struct SolvePoint {
   std::uint32_t entity = kNoEntity;
 };
 
+/// Share of a point's hemisphere that shows a patch of the scenery.
+struct SightLink {
+  std::uint32_t patch = 0;
+  double share_frac = 0.0;
+};
+/// Patches in the view of a point.
+struct PointSight {
+  std::vector<SightLink> links;
+};
+
+/// State of a patch at an instant.
+struct PatchState {
+  double temperature_k = 0.0;
+  double sky_frac = 0.0;  ///< of the patch's own hemisphere
+};
+
+class SightBuilder;
+
+/// Temperatures of points, and what they see at that instant.
+struct PointSolution {
+  std::vector<double> kelvin;
+  std::vector<PointSight> sights;  ///< one per point; without links if there is no exchange
+  std::vector<std::uint32_t> patch_material;
+  std::vector<PatchState> patches;
+};
+
 /// One-dimensional histories of points, with the visibility of sun and sky at the places where the
-/// points were in the past. Owner: the caller.
+/// points were in the past, and with the radiation of the scenery that they see: with
+/// thermal.exchange, rays end on patches with histories of their own, and theirs on further
+/// patches, which take all that they see for surroundings of the environment's temperature. Moving
+/// objects and what they see count as surroundings. Owner: the caller.
 class PointHistories {
  public:
   /// Prepares histories from the start of the climate's history. Visibility is sampled densely from
@@ -34,17 +63,16 @@ class PointHistories {
   /// The calling thread calls `done` between portions with the share done; a return of false stops
   /// the run, and the other points are NaN.
   /// Errors: those of material_mesh().
-  [[nodiscard]] physics::Result<std::vector<double>> temperatures(
+  [[nodiscard]] physics::Result<PointSolution> temperatures(
       std::span<const SolvePoint> points, std::int64_t sim_time_ns,
       const std::function<bool(double)>& done) const;
 
  private:
+  class Run;
+  void trace_sights(const Run& run, std::span<const SolvePoint> points, SightBuilder& sight,
+                    std::span<PointSight> front, std::span<PointSight> back) const;
   void choose_nodes(std::int64_t until_ns, std::vector<std::int64_t>& nodes_ns) const;
   [[nodiscard]] bool moves(const SceneInstant& a, const SceneInstant& b) const;
-  [[nodiscard]] std::vector<ViewSample> views(const SolvePoint& point,
-                                              std::span<const std::int64_t> nodes_ns,
-                                              std::span<const SceneInstant> instants,
-                                              std::int64_t sim_time_ns) const;
 
   const scene::ScenarioDesc& scenario_;
   const scene::SceneGeometry& geometry_;

@@ -74,7 +74,9 @@ struct Setting {
   std::uint32_t filter_taps = 32;
   std::uint32_t modes = 0;  ///< foster: 0 = those of the material
   double tolerance_k = 0.1;
-  bool lateral = true;  ///< cached: conduction along the surface and across edges
+  bool lateral = true;     ///< cached: conduction along the surface and across edges
+  bool standard = false;   ///< the figures of every scene show this setting
+  bool variation = false;  ///< the plots show the setting beside the curves
 };
 
 std::string_view name_of(scene::ThermalModel model) {
@@ -95,11 +97,16 @@ std::string_view name_of(scene::StepSpacing spacing) {
   return spacing == scene::StepSpacing::uniform ? "uniform" : "geometric";
 }
 
-std::vector<Setting> sweep(bool quick) {
+/// Returns the settings of a scene whose reference has a number of dimensions. Settings of `cached`
+/// have the physics of the reference: one dimension knows no conduction along surfaces. One setting
+/// has it there too, and shows the difference of the models.
+std::vector<Setting> sweep(bool quick, int dimension) {
   std::vector<Setting> settings;
-  const auto cached = [&settings]() -> Setting& {
+  const bool three = dimension == 3;
+  const auto cached = [&settings, three]() -> Setting& {
     Setting& setting = settings.emplace_back();
     setting.method = Method::cached;
+    setting.lateral = three;
     return setting;
   };
   const std::vector<std::uint32_t> steps =
@@ -111,11 +118,14 @@ std::vector<Setting> sweep(bool quick) {
         setting.model = model;
         setting.spacing = spacing;
         setting.steps = count;
+        setting.standard = spacing == scene::StepSpacing::geometric && count == 27;
       }
     }
   }
-  cached();
-  cached().lateral = false;
+  cached().standard = true;
+  Setting& other = cached();
+  other.lateral = !three;
+  other.variation = true;
   for (const auto model : {scene::ThermalModel::emit2014, scene::ThermalModel::foster}) {
     for (const std::uint32_t count : steps) {
       Setting& setting = settings.emplace_back();
@@ -245,9 +255,16 @@ struct Truth {
 };
 
 std::string describe(const reference::SolveReport& report, std::uint32_t rays) {
-  return report.dimension == 3 ? fmt::format("3-D conduction, {} nodes, {} faces, {} rays per face",
-                                             report.nodes, report.faces, rays)
-                               : fmt::format("1-D conduction behind every pixel, {} rays", rays);
+  const double shaded_h = report.spin_up_s / 3600.0;
+  return report.dimension == 3
+             ? fmt::format(
+                   "3-D conduction, {} nodes, {} faces, {} rays per face, {:g} h of shaded "
+                   "history before",
+                   report.nodes, report.faces, rays, shaded_h)
+             : fmt::format(
+                   "1-D conduction behind every pixel, exchange once, {} rays, {:g} h of "
+                   "shaded history before",
+                   rays, shaded_h);
 }
 
 Result<Truth> solve_truth(const scene::ScenarioDesc& scenario, const reference::SolveView& view,
@@ -268,6 +285,7 @@ Result<Truth> solve_truth(const scene::ScenarioDesc& scenario, const reference::
   const auto start = Clock::now();
   auto images = reference::solve(scenario, *geometry, std::span(&view, 1), options, &truth.report);
   if (!images) return tl::unexpected(images.error());
+  for (const std::string& note : truth.report.notes) warn(label + ": " + note);
   truth.solve_s = std::chrono::duration<double>(Clock::now() - start).count();
   truth.image = std::move(images->front());
 
@@ -301,14 +319,16 @@ struct Row {
   double warm_up_ms = 0.0;
   ErrorSummary kelvin;
   ErrorSummary fraction;
+  bool same_model = true;  ///< false: the reference lacks physics that the setting has
   bool pareto = false;
 };
 
 /// Marks the rows for which no other setting of the same scene and region is both faster and more
-/// accurate. A ray tracer is left out, because its time lacks a part.
+/// accurate. A ray tracer is left out, because its time lacks a part, and so is a setting with
+/// physics that the reference lacks.
 void mark_pareto(std::vector<Row>& rows) {
   const auto counts = [](const Row& row) {
-    return row.kelvin.pixels > 0 && row.setting.method != Method::embree;
+    return row.kelvin.pixels > 0 && row.same_model && row.setting.method != Method::embree;
   };
   for (Row& row : rows) {
     row.pareto = counts(row) && std::ranges::none_of(rows, [&](const Row& other) {
@@ -337,6 +357,7 @@ Json row_json(const Row& row, const ErrorOptions& command, const std::string& re
   json.set("map_size", maps ? Json(s.shadow_map_px) : Json(nullptr));
   json.set("taps", maps ? Json(taps_text(s)) : Json(nullptr));
   json.set("occlusion", maps ? "screen-space" : "rays").set("lateral", cached && s.lateral);
+  json.set("same_model", row.same_model);
   json.set("warm_up_ms", row.warm_up_ms);
   const std::uint32_t modes = modes_of(s);
   json.set("modes", modes == 0 ? Json("material") : Json(modes));
@@ -361,18 +382,19 @@ Json row_json(const Row& row, const ErrorOptions& command, const std::string& re
 
 Result<void> write_csv(const std::filesystem::path& file, const std::vector<Row>& rows) {
   std::ofstream out(file, std::ios::binary);
-  out << "scene,region,method,model,steps,spacing,map_size,taps,modes,tolerance_k,lateral,frame_ms_"
-         "median,max_error_k,"
+  out << "scene,region,method,model,steps,spacing,map_size,taps,modes,tolerance_k,lateral,"
+         "same_model,"
+         "frame_ms_median,max_error_k,"
          "rms_error_k,p99_error_k,max_error_frac,rms_error_frac,p99_error_frac,pareto,pixels\n";
   for (const Row& row : rows) {
     const Setting& s = row.setting;
     out << fmt::format(
-        "{},{},{},{},{},{},{},{},{},{:g},{},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},"
+        "{},{},{},{},{},{},{},{},{},{:g},{},{},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},"
         "{:.4g},{},{}\n",
         row.scene, name_of(row.region), name_of(s.method), name_of(s.model), s.steps,
         name_of(s.spacing), s.shadow_map_px, taps_text(s), modes_of(s), s.tolerance_k,
-        s.lateral ? 1 : 0, row.frame_ms, row.kelvin.max, row.kelvin.rms, row.kelvin.p99,
-        row.fraction.max, row.fraction.rms, row.fraction.p99, row.pareto ? 1 : 0,
+        s.lateral ? 1 : 0, row.same_model ? 1 : 0, row.frame_ms, row.kelvin.max, row.kelvin.rms,
+        row.kelvin.p99, row.fraction.max, row.fraction.rms, row.fraction.p99, row.pareto ? 1 : 0,
         row.kelvin.pixels);
   }
   out.flush();
@@ -407,7 +429,7 @@ Plot plot_of(const std::string& scene, const std::vector<Row>& rows) {
     const Setting& s = row.setting;
     if (row.pareto) front.points.push_back(point(row));
     if (s.shadow_map_px != standard.shadow_map_px || s.filter_taps != standard.filter_taps ||
-        s.modes != standard.modes || !s.lateral) {
+        s.modes != standard.modes || s.variation) {
       variations.points.push_back(point(row));
       continue;
     }
@@ -436,13 +458,6 @@ struct Findings {
   TextTable references{{"scene", "reference", "pixels", "solve s", "edge band m"}};
 };
 
-/// Returns true for the setting that the figures of every scene show.
-bool is_standard(const Setting& setting) {
-  return setting.steps == 27 && setting.spacing == scene::StepSpacing::geometric &&
-         setting.shadow_map_px == 1024 && setting.filter_taps == 32 && setting.modes == 0 &&
-         setting.tolerance_k == 0.1 && setting.lateral;
-}
-
 /// Loads the shipped scenario with the changes of this suite. Errors: config.
 Result<scene::ScenarioDesc> suite_scenario(const std::string& name, const ErrorOptions& command) {
   auto scenario = load_scenario_choice({name, {}});
@@ -468,6 +483,8 @@ void add_rows(const std::string& scene, const Setting& setting, const Shot& shot
     row.setting = setting;
     row.frame_ms = shot.frame_ms;
     row.warm_up_ms = shot.warm_up_ms;
+    row.same_model =
+        truth.report.dimension == 3 || setting.method != Method::cached || !setting.lateral;
     row.kelvin =
         summarize_error(shot.temperature_k, truth.image.temperature_k, truth.masks[r], false);
     if (!shot.radiance_w_m2_sr.empty()) {
@@ -479,8 +496,7 @@ void add_rows(const std::string& scene, const Setting& setting, const Shot& shot
 }
 
 /// Computes the reference of one scene and compares all settings with it.
-Result<void> run_scene(const std::string& name, const std::vector<Setting>& settings,
-                       const ErrorOptions& command, Findings& findings) {
+Result<void> run_scene(const std::string& name, const ErrorOptions& command, Findings& findings) {
   const auto scenario = suite_scenario(name, command);
   if (!scenario) return tl::unexpected(scenario.error());
   const std::int64_t now_ns = observation_ns(*scenario);
@@ -489,6 +505,7 @@ Result<void> run_scene(const std::string& name, const std::vector<Setting>& sett
                                   scenario->sensor.fov_h_rad};
   const auto truth = solve_truth(*scenario, view, command, name);
   if (!truth) return tl::unexpected(truth.error());
+  const std::vector<Setting> settings = sweep(command.quick, truth->report.dimension);
   const std::string& reference = findings.reference_text[name] =
       describe(truth->report, command.rays);
   findings.references.add({name, reference, fmt::format("{}", truth->image.solved_px),
@@ -503,7 +520,7 @@ Result<void> run_scene(const std::string& name, const std::vector<Setting>& sett
                                                        : shoot(*scenario, setting, view, command);
     if (!shot) return tl::unexpected(shot.error());
     if (!shot->device.empty()) findings.device = shot->device;
-    if (is_standard(setting)) {
+    if (setting.standard) {
       figures.add(setting.method == Method::cached ? std::string(name_of(setting.method))
                                                    : std::string(name_of(setting.model)),
                   shot->temperature_k);
@@ -529,8 +546,11 @@ TextTable table_of(const std::vector<Row>& rows) {
                maps ? fmt::format("{}", all.setting.shadow_map_px) : "-",
                maps ? taps_text(all.setting) : "-", fmt::format("{:g}", all.setting.tolerance_k),
                cached && all.setting.lateral ? "yes" : "no",
-               fmt::format("{:.1f}{}", all.frame_ms, all.pareto ? " *" : "  "), k(all.kelvin.rms),
-               k(all.kelvin.p99), k(all.kelvin.max), k(rows[i + 1].kelvin.max),
+               fmt::format("{:.1f}{}", all.frame_ms,
+                           all.pareto       ? " *"
+                           : all.same_model ? "  "
+                                            : " d"),
+               k(all.kelvin.rms), k(all.kelvin.p99), k(all.kelvin.max), k(rows[i + 1].kelvin.max),
                k(rows[i + 2].kelvin.max), k(rows[i + 3].kelvin.p99), k(rows[i + 4].kelvin.p99)});
   }
   return table;
@@ -563,14 +583,15 @@ int run(const ErrorOptions& command) {
       command.scenes.empty()
           ? std::vector<std::string>{"block-on-road", "ribbed", "statue", "airfield"}
           : command.scenes;
-  const std::vector<Setting> settings = sweep(command.quick);
   const InterruptGuard interrupt;
   Findings findings;
   for (const std::string& name : scenes) {
-    if (auto ran = run_scene(name, settings, command, findings); !ran) return fail(ran.error());
+    if (auto ran = run_scene(name, command, findings); !ran) return fail(ran.error());
   }
   mark_pareto(findings.rows);
-  fmt::print(text_stream(command.json), "{}, commit {}, {}x{}, * = none faster and better\n{}{}",
+  fmt::print(text_stream(command.json),
+             "{}, commit {}, {}x{}, * = none faster and better, d = with physics "
+             "that the reference lacks\n{}{}",
              findings.device, kCommit, command.width_px, command.height_px,
              findings.references.to_string(), table_of(findings.rows).to_string());
   if (auto written = write_files(scenes, command, findings); !written) return fail(written.error());

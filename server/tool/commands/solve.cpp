@@ -316,7 +316,9 @@ physics::Result<void> Solving::run(const scene::SceneGeometry& geometry) {
   const InterruptGuard interrupts;
   Progress bar("solve", 1000);
   const auto start = std::chrono::steady_clock::now();
-  auto solver = reference::SceneSolver::create(scenario_, geometry, solver_options(command_, bar),
+  reference::SolveOptions options = solver_options(command_, bar);
+  options.first_ns = std::llround(plan_.times_s.front() * 1e9);
+  auto solver = reference::SceneSolver::create(scenario_, geometry, options,
                                                std::llround(plan_.times_s.back() * 1e9));
   if (!solver) return tl::unexpected(std::move(solver.error()));
   solver_.emplace(std::move(*solver));

@@ -194,6 +194,75 @@ TEST(ReferenceBodies, SkinOfSteelOnFoamSpreadsHeatAroundAnEdgeAsAMembraneDoes) {
   }
 }
 
+constexpr double kColumnM = 0.4;
+constexpr double kColumnW = 1.28;  ///< conductivity, W/(m K)
+
+/// Returns the rise of an endless square column with a film on all four sides, of which the one at
+/// y = kColumnM absorbs a flux: a series over cos(p (x - kColumnM / 2)) with p tan(p kColumnM / 2)
+/// = film / conductivity, which is the film's condition at x = 0 and x = kColumnM.
+double column_rise_k(double x, double y, double flux, double film) {
+  const double half = 0.5 * kColumnM;
+  double sum = 0.0;
+  for (int n = 0; n < 60; ++n) {
+    // Bisect for p within the branch of the tangent that rises from n pi to (n + 1/2) pi.
+    double low = n * physics::kPi / half;
+    double high = (n + 0.5) * physics::kPi / half;
+    for (int i = 0; i < 80; ++i) {
+      const double p = 0.5 * (low + high);
+      (p * std::sin(p * half) * std::cos(p * half) <
+               film / kColumnW * std::cos(p * half) * std::cos(p * half)
+           ? low
+           : high) = p;
+    }
+    const double p = 0.5 * (low + high);
+    const double share = 2.0 * std::sin(p * half) / (p * half + 0.5 * std::sin(2.0 * p * half));
+    // f = A e^(p (y - b)) + B e^(-p y) has the film at y = 0 and flux and film at y = b.
+    const double ratio = (kColumnW * p - film) / (kColumnW * p + film);
+    const double fade = std::exp(-p * kColumnM);
+    const double a =
+        flux * share / (kColumnW * p + film - (kColumnW * p - film) * ratio * fade * fade);
+    const double f = a * (std::exp(p * (y - kColumnM)) + ratio * fade * std::exp(-p * y));
+    sum += f * std::cos(p * (x - half));
+  }
+  return sum;
+}
+
+/// Returns the largest error of a column of concrete against the series, of its greatest rise.
+double column_error(double refine) {
+  constexpr double kFilm = 15.0;
+  constexpr double kFlux = 500.0;
+  TestScene t;
+  t.geometry.materials = {material_of("concrete", {{0.5, kColumnW, 2300.0, 878.0}})};
+  scene::Mesh mesh;
+  add_box(mesh, {0, 0, 0}, {kColumnM, kColumnM, 0.02});
+  finish_mesh(t, std::move(mesh), 0);
+  VoxelOptions options;
+  options.refine = refine;
+  const Steady column(t, options, 1e7, [&](const SolidFace& face) -> Lit {
+    if (face.axis == 2) return {};
+    return {face.axis == 1 && face.sign > 0 ? kFlux : 0.0, kFilm};
+  });
+  double worst = 0.0;
+  for (const double away : {0.0, 0.004, 0.02, 0.1, 0.2}) {
+    const double lit = column.rise_k({away, kColumnM, 0.01}, {0.0, 1.0, 0.0});
+    const double side = column.rise_k({0.0, kColumnM - away, 0.01}, {-1.0, 0.0, 0.0});
+    EXPECT_TRUE(std::isfinite(lit + side));
+    worst = std::max({worst, std::abs(lit - column_rise_k(away, kColumnM, kFlux, kFilm)),
+                      std::abs(side - column_rise_k(0.0, kColumnM - away, kFlux, kFilm))});
+  }
+  return worst / column_rise_k(0.5 * kColumnM, kColumnM, kFlux, kFilm);
+}
+
+TEST(ReferenceBodies, CornerOfConcreteLitOnOneSideIsTheSeries) {
+  const double coarse = column_error(0.5);
+  const double fine = column_error(1.0);
+  RecordProperty("error_at_half", std::to_string(coarse));
+  RecordProperty("error_at_1", std::to_string(fine));
+  RecordProperty("order", std::to_string(std::log2(coarse / fine)));
+  EXPECT_LT(fine, 0.003);
+  EXPECT_GT(std::log2(coarse / fine), 1.5);
+}
+
 /// Returns two slabs of 0.2 m by 0.2 m on each other: 5 cm of wood on 3 cm of concrete, whose
 /// layers reach through both.
 TestScene stack_scene() {

@@ -236,7 +236,6 @@ TEST(CliSolve, points_of_a_table_have_temperatures_at_every_instant) {
       run_emit(quick_solve({"--at", folder.file("at.csv"), "--json", folder.file("a.json")}));
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_NE(result.err.find("1 of 2 points"), std::string::npos) << result.err;
-  EXPECT_NE(result.err.find("thermal.exchange"), std::string::npos) << result.err;
   std::istringstream lines(result.out);
   std::string line;
   std::getline(lines, line);

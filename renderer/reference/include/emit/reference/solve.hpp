@@ -40,6 +40,9 @@ struct SolveOptions {
   /// Least length of the shaded history before the scenario's own, s. Scenarios without a spin-up
   /// begin at their initial temperatures and get none.
   double spin_up_s = 72.0 * 3600.0;
+  /// First instant that a picture will be asked for. Three dimensions take all but the last day
+  /// before it on a coarse grid. The lowest number keeps the whole history of the scenario fine.
+  std::int64_t first_ns = std::numeric_limits<std::int64_t>::min() / 2;
   /// Number of pixels of the surface that are solved, always the same ones; 0 solves all.
   std::uint64_t pixels = 0;
   /// Folder of the checkpoint; empty if there is none. Only three dimensions have one.
