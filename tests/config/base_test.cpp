@@ -68,6 +68,18 @@ TEST_F(BaseTest, a_printed_scenario_keeps_kinds_and_stated_numbers) {
   }
 }
 
+TEST_F(BaseTest, objects_state_their_interior_and_print_it) {
+  const auto loaded = scenario(
+      "[[object]]\ngltf = \"a.glb\"\ninterior_heat_j_m2_k = 40000\n"
+      "interior_ventilation_w_m2_k = 0\n[[object]]\ngltf = \"a.glb\"\n");
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
+  EXPECT_EQ(loaded->objects[0].interior, (scene::BodyInterior{40'000.0, 0.0}));
+  EXPECT_EQ(loaded->objects[1].interior, scene::BodyInterior{});
+  const auto again = load_scenario(write("again.toml", print_scenario(*loaded)), {}, options_);
+  ASSERT_TRUE(again.has_value()) << again.error().text;
+  EXPECT_EQ(again->objects[0].interior, loaded->objects[0].interior);
+}
+
 TEST_F(BaseTest, without_weather_place_and_date_give_it_and_a_warning_says_so) {
   const auto loaded =
       scenario("epoch_utc = 2024-01-15T12:00:00Z\n[place]\nlat_deg = 70\nlon_deg = 0\n");

@@ -260,6 +260,11 @@ const std::vector<Case>& cases() {
        "s.toml:6:8: 'base' is room: key 'base_k' is missing, which states its temperature"},
       {"unknown_base", material("base = \"cellar\"\n" + kLayer),
        "s.toml:6:8: 'base' is 'cellar', must be one of: ground, air, room, body"},
+      {"interior_heat", "[[object]]\ngltf = \"a.glb\"\ninterior_heat_j_m2_k = 0\n",
+       "s.toml:4:24: 'interior_heat_j_m2_k' is 0, must be 100 .. 10000000"},
+      {"interior_ventilation",
+       "[[object]]\ngltf = \"a.glb\"\ninterior_ventilation_w_m2_k = \"none\"\n",
+       "s.toml:4:31: 'interior_ventilation_w_m2_k' must be a number, not a string"},
       {"material_without_name",
        "[[material]]\nsolar_absorptance_frac = 0.5\nemissivity_frac = "
        "0.9\nprescribed_k = 400\n",

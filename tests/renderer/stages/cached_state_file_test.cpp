@@ -53,6 +53,7 @@ scene::ScenarioDesc saved_scenario(const std::filesystem::path& state_file) {
   physics::Pose away = spot;
   away.position_world_m.x += 200.0;
   vehicle.parts = {{1, "hull", s.materials[0].name, {}, {}}};
+  s.materials[0].base = scene::BaseKind::body;  // both objects have an interior
   vehicle.trajectory = {{0, spot, true, false},
                         {2 * kHourNs + 5 * kSecondNs, spot, true, false},
                         {2 * kHourNs + 6 * kSecondNs, away, true, true}};
@@ -183,6 +184,9 @@ TEST(RendererStateFile, OneThatDoesNotFitIsRefusedWithTheReasonAndKept) {
        [](auto& s) {
          s.objects[1].parts[0].commands = {{0, {scene::PartCommand::Kind::power, 100.0}}};
        }},
+      {"scene geometry", [](auto& s) { s.objects[1].interior.heat_j_m2_k += 1.0; }},
+      {"scene geometry", [](auto& s) { s.objects[0].interior.ventilation_w_m2_k += 0.1; }},
+      {"materials", [](auto& s) { s.materials[0].base = scene::BaseKind::room; }},
       {"materials", [](auto& s) { s.materials[0].solar_absorptance_frac -= 0.01; }},
       {"materials", [](auto& s) { s.materials[0].layers[1].conductivity_w_m_k += 0.1; }},
       {"place or date", [](auto& s) { s.place.lat_rad += 1e-6; }},

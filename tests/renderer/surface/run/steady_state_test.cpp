@@ -37,6 +37,7 @@ class SteadyState : public ::testing::TestWithParam<scene::ThermalModel> {
     stone.layers = {{0.15, 0.7, 2120, 920}, {0.3, 1.5, 2000, 950}};
     stone.solar_absorptance_frac = 0.8;
     stone.emissivity_frac = 0.9;
+    stone.base = scene::BaseKind::body;  // with foster each object has an interior
     stone.base_k = 286.15;
     stone.modes = {{300.0, 0.5}, {5000.0, 0.5}};
     scenario_.materials = {stone};
@@ -93,6 +94,7 @@ class SteadyState : public ::testing::TestWithParam<scene::ThermalModel> {
 TEST_P(SteadyState, IntervalsOfSamplesNeedNoHeap) {
   ASSERT_NO_FATAL_FAILURE(warm_up());
   ASSERT_GT(surface_->model().samples.samples.size(), 500U);
+  ASSERT_EQ(surface_->model().body_k.size(), GetParam() == scene::ThermalModel::foster ? 3U : 0U);
 
   const auto interval_ns =
       static_cast<std::int64_t>(scenario_.thermal.first_step_s * static_cast<double>(kSecondNs));
