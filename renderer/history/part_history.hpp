@@ -46,7 +46,7 @@ class PartHistory {
   void reset() noexcept;
 
   /// Returns the heat at an instant. A throttle moves the temperature behind the skin towards that
-  /// of the throttle with the part's time constants (physics.md eq. 27); switched off, towards
+  /// of the throttle with the part's time constants (physics.md eq. 29); switched off, towards
   /// cold_k.
   [[nodiscard]] PartHeat at(std::int64_t sim_time_ns) const noexcept;
 

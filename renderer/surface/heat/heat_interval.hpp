@@ -69,7 +69,7 @@ struct SampleDrive {
   /// eq. 22).
   std::array<double, kMaxPartners> partner_begin_w_m2{};
   std::array<double, kMaxPartners> partner_end_w_m2{};
-  /// Heat of the part that the sample belongs to (physics.md eq. 27).
+  /// Heat of the part that the sample belongs to (physics.md eq. 29).
   PartHeatSpan part;
 
   /// Takes the heat of the sample's part from the forcing of an interval.

@@ -181,6 +181,12 @@ void CachedSurface::begin_first_interval(std::int64_t start_ns, const Inputs& in
                                         inputs.entities.size(), inputs.parts},
                       interval_.rays(), heat_.sized_interval());
   local_->restart(start_ns);
+  bodies_.reset();
+  if (model_options().exchange && !inputs.entities.empty()) {
+    bodies_.emplace(
+        geometry_, *model_, anchors_,
+        BodySurroundings::Grid{grid_.start_ns(), grid_.interval_ns(), local_->step_ns(), start_ns});
+  }
   // Compute node 1.
   begin_anew(0, inputs, history);
   interval_.compute(nodes_[0], nodes_[1], static_cast<std::uint32_t>(count), model_->samples,
@@ -349,6 +355,11 @@ void CachedSurface::advance(std::int64_t now_ns, const Inputs& inputs,
       end_interval(inputs, history);
     }
     take_weather(now_ns, inputs, history);  // a change may have waited for this
+  }
+  // Look around from entities that have moved.
+  if (bodies_) {
+    bodies_->run(now_ns, inputs.entities, nodes_[0].outputs);
+    interval_.see(bodies_->views());
   }
   // Advance blocks on their own and exposure tiles to now.
   run_local(now_ns, inputs, history);

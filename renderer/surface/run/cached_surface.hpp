@@ -16,6 +16,7 @@
 #include "history/surface_history.hpp"
 #include "surface/heat/sample_heat.hpp"
 #include "surface/model/surface_model.hpp"
+#include "surface/run/body_surroundings.hpp"
 #include "surface/run/local_steps.hpp"
 #include "surface/run/node_grid.hpp"
 #include "surface/run/sampled_scene.hpp"
@@ -40,8 +41,8 @@ namespace emit::renderer {
 ///
 /// This class owns the order of the work. Its parts are the geometry (SurfaceGeometry), the warm-up
 /// (SurfaceWarmUp), the times of the nodes (NodeGrid), the nodes (SurfaceNodes), the interval that
-/// is being computed (SurfaceInterval), blocks with shorter steps (LocalSteps), and the shade of
-/// entities (EntityShadows, ExposureTiles).
+/// is being computed (SurfaceInterval), blocks with shorter steps (LocalSteps), what entities that
+/// move come to see (BodySurroundings), and the shade of entities (EntityShadows, ExposureTiles).
 ///
 /// Owner: Renderer. Thread: the renderer's; computes on all cores. Real time: advance() allocates
 /// nothing, on any thread; everything else is setup.
@@ -217,6 +218,7 @@ class CachedSurface {
   FrameShares shares_;  ///< time in which the samples of `interval_` are computed
   std::vector<EntityAnchor> anchors_;
   std::optional<LocalSteps> local_;
+  std::optional<BodySurroundings> bodies_;  ///< none where faces do not exchange radiation
   EntityShadows entity_shadows_;
   std::optional<ExposureTiles> exposure_tiles_;
 

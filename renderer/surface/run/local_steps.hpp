@@ -96,6 +96,8 @@ class LocalSteps {
   /// `before` is `next`.
   void rotated(const Window& window, const SurfaceSamples& all) noexcept;
 
+  /// Length of a step.
+  [[nodiscard]] std::int64_t step_ns() const noexcept { return step_ns_; }
   /// Number of blocks that do not follow the interval, blocks about to leave it included.
   [[nodiscard]] std::size_t active() const noexcept;
   /// Returns true for samples of blocks that are on their own, or were in this interval: node

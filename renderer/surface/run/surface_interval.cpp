@@ -34,6 +34,7 @@ void SurfaceInterval::reset(const SurfaceModel& model, std::vector<EntityAnchor>
   rays_.anchor(std::move(anchors));
   done_ = 0;
   exitance_ = {};
+  views_ = {};
   faces_.clear();
   bodies_ = BodyNodes(model, geometry_.geometry(), heat_);
   inflow_w_.assign(bodies_.size(), 0.0);

@@ -59,6 +59,8 @@ class SurfaceInterval {
   void compute(const SurfaceNode& from, SurfaceNode& to, std::uint32_t end,
                const SurfaceSamples& all, const LocalSteps* skipped,
                threads::WorkerPool& workers) noexcept;
+  /// Sets the views of entities that the next steps use; they stay in place.
+  void see(std::span<const BodyView> views) noexcept { views_ = views; }
   /// Number of samples that are computed.
   [[nodiscard]] std::uint32_t done() const noexcept { return done_; }
 
@@ -66,7 +68,7 @@ class SurfaceInterval {
   [[nodiscard]] const HeatInterval& heat_interval() const noexcept { return interval_; }
   /// Input that all steps share in this interval.
   [[nodiscard]] SurfaceStep step(const SurfaceSamples& all) const noexcept {
-    return {all, heat_, geometry_.rays(), faces_, body_mean_k_};
+    return {all, heat_, geometry_.rays(), faces_, body_mean_k_, views_};
   }
 
  private:
@@ -79,6 +81,7 @@ class SurfaceInterval {
   BodyNodes bodies_;
   std::vector<double> inflow_w_;     ///< by body, at the node with which the interval begins
   std::vector<double> body_mean_k_;  ///< by body, mean over the interval
+  std::span<const BodyView> views_;
   std::uint32_t turn_ = 0;
   std::uint32_t done_ = 0;
 };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "surface/run/surface_step.hpp"
 
+#include <algorithm>
 #include <cstddef>
 #include <optional>
 
@@ -11,8 +12,13 @@
 namespace emit::renderer {
 namespace {
 
+/// Share of a whole, 0 to 1; 0 of nothing.
+float share_of(float part, float whole) noexcept {
+  return whole > 1e-6F ? std::clamp(part / whole, 0.0F, 1.0F) : 0.0F;
+}
+
 /// Sample with the view that it has in an interval. Only the samples of entities that have moved
-/// since the warm-up are copied for it.
+/// since the warm-up, or that others have left or come to, are copied for it.
 class ViewedSample {
  public:
   ViewedSample(const SurfaceStep& step, const IntervalRays& interval_rays,
@@ -22,7 +28,13 @@ class ViewedSample {
                                   ? interval_rays.stand(static_cast<std::size_t>(sample.entity))
                                   : EntityStand{};
     view_ = view_of_now(step.all, sample, stand);
-    if (stand.moved_frac == 0.0F) return;
+    if (sample.entity >= 0 && !step.views.empty()) {
+      leave_departed(step, interval_rays, sample);
+      const BodyView& body = step.views[static_cast<std::size_t>(sample.entity)];
+      if (body.known) meet(body.towards(sample.normal), sample, stand);
+      changed_ = changed_ || body.known;
+    }
+    if (stand.moved_frac == 0.0F && !changed_) return;
     moved_ = sample;
     moved_->sky_frac = view_.sky_frac;
     moved_->far_frac = view_.far_frac;
@@ -34,10 +46,72 @@ class ViewedSample {
 
   [[nodiscard]] const SurfaceSample& sample() const noexcept { return *sample_; }
   [[nodiscard]] const ViewOfNow& view() const noexcept { return view_; }
+  /// Radiation of surfaces that stand there now and that the warm-up did not see, by their shares
+  /// of the hemisphere.
+  [[nodiscard]] double longwave_w_m2() const noexcept { return longwave_w_m2_; }
+  [[nodiscard]] double shortwave_w_m2() const noexcept { return shortwave_w_m2_; }
+  /// Share of the other samples in view that bodies which came stand before, and what those send.
+  [[nodiscard]] float hidden_frac() const noexcept { return hidden_frac_; }
+  [[nodiscard]] const SideView::Met& before() const noexcept { return before_; }
 
  private:
+  /// Gives the shares of samples of entities that have left to the sky and to the surroundings.
+  void leave_departed(const SurfaceStep& step, const IntervalRays& interval_rays,
+                      const SurfaceSample& sample) noexcept {
+    float left_frac = 0.0F;
+    for (std::uint32_t k = 0; k < sample.seen_count; ++k) {
+      const SeenSample& seen = step.all.seen[sample.first_seen + k];
+      const std::int32_t other = step.all.samples[seen.sample].entity;
+      if (other < 0 || other == sample.entity) continue;
+      left_frac +=
+          seen.weight_frac * interval_rays.stand(static_cast<std::size_t>(other)).moved_frac;
+    }
+    left_frac *= view_.others_scale;
+    if (left_frac == 0.0F) return;
+    // They were at about the height of the body: the horizon halves them for an upright face.
+    const float up_frac = 0.5F + 0.5F * interval_rays.normal(sample).z;
+    view_.sky_frac += up_frac * left_frac;
+    view_.far_frac += (1.0F - up_frac) * left_frac;
+    changed_ = true;
+  }
+  /// Puts the surfaces that stand there before sky, surroundings and other samples (physics.md
+  /// eq. 30).
+  void meet(const SideView& side, const SurfaceSample& sample, const EntityStand& stand) noexcept {
+    const auto take = [this](float& from_frac, float take_frac, const SideView::Met& met) {
+      if (!(met.frac > 0.0F)) return;
+      take_frac = std::min(take_frac, from_frac);
+      from_frac -= take_frac;
+      longwave_w_m2_ += take_frac * met.longwave_w_m2 / met.frac;
+      shortwave_w_m2_ += take_frac * met.shortwave_w_m2 / met.frac;
+    };
+    const float p = stand.moved_frac;
+    const float down_frac = 1.0F - side.up_frac;
+    if (p > 0.0F) {
+      const float sky_frac = p * sky_past_hull(sample, stand.up_body);
+      const float ground_frac = std::max(0.0F, p * sample.hull_open_frac - sky_frac);
+      take(view_.sky_frac, sky_frac * share_of(side.still_up.frac, side.up_frac), side.still_up);
+      take(view_.far_frac, ground_frac * share_of(side.still_down.frac, down_frac),
+           side.still_down);
+    }
+    take(view_.sky_frac,
+         view_.sky_frac * share_of(side.moved_up.frac, side.up_frac - side.still_up.frac),
+         side.moved_up);
+    take(view_.far_frac,
+         view_.far_frac * share_of(side.moved_down.frac, down_frac - side.still_down.frac),
+         side.moved_down);
+    if (side.moved_down.frac > 0.0F) {
+      hidden_frac_ = share_of(side.moved_down.frac, down_frac);
+      before_ = side.moved_down;
+    }
+  }
+
   const SurfaceSample* sample_;
   ViewOfNow view_;
+  double longwave_w_m2_ = 0.0;
+  double shortwave_w_m2_ = 0.0;
+  float hidden_frac_ = 0.0F;
+  SideView::Met before_;
+  bool changed_ = false;
   std::optional<SurfaceSample> moved_;
 };
 
@@ -66,21 +140,37 @@ SampleDrive drive_of(const SurfaceStep& step, const IntervalRays& interval_rays,
   struct Radiation {
     double longwave_w_m2 = 0.0;
     double shortwave_w_m2 = 0.0;
+    double frac = 0.0;
   };
   Radiation own;
   Radiation others;
-  const bool apart = view.own_scale != view.others_scale;
+  const bool apart = view.own_scale != view.others_scale || viewed.hidden_frac() > 0.0F;
+  const bool some_left = sample.entity >= 0 && !step.views.empty();
   for (std::uint32_t k = 0; k < sample.seen_count; ++k) {
     const SeenSample& seen = step.all.seen[sample.first_seen + k];
     const SampleOutput& other = begin[seen.sample];
-    Radiation& sum = apart && step.all.samples[seen.sample].entity == sample.entity ? own : others;
-    sum.longwave_w_m2 += seen.weight_frac * other.longwave_out_w_m2;
-    sum.shortwave_w_m2 += seen.weight_frac * other.shortwave_out_w_m2;
+    const std::int32_t of_entity = step.all.samples[seen.sample].entity;
+    Radiation& sum = apart && of_entity == sample.entity ? own : others;
+    float weight_frac = seen.weight_frac;
+    if (some_left && of_entity >= 0 && of_entity != sample.entity) {
+      weight_frac *= 1.0F - interval_rays.stand(static_cast<std::size_t>(of_entity)).moved_frac;
+    }
+    sum.longwave_w_m2 += weight_frac * other.longwave_out_w_m2;
+    sum.shortwave_w_m2 += weight_frac * other.shortwave_out_w_m2;
+    sum.frac += weight_frac;
+  }
+  if (const float hidden_frac = viewed.hidden_frac(); hidden_frac > 0.0F) {
+    const SideView::Met& before = viewed.before();
+    others.longwave_w_m2 +=
+        hidden_frac * (others.frac * before.longwave_w_m2 / before.frac - others.longwave_w_m2);
+    others.shortwave_w_m2 +=
+        hidden_frac * (others.frac * before.shortwave_w_m2 / before.frac - others.shortwave_w_m2);
   }
   drive.longwave_begin_w_m2 +=
       view.others_scale * others.longwave_w_m2 + view.own_scale * own.longwave_w_m2;
-  drive.shortwave_w_m2 =
-      view.others_scale * others.shortwave_w_m2 + view.own_scale * own.shortwave_w_m2;
+  drive.longwave_begin_w_m2 += viewed.longwave_w_m2();
+  drive.shortwave_w_m2 = viewed.shortwave_w_m2() + view.others_scale * others.shortwave_w_m2 +
+                         view.own_scale * own.shortwave_w_m2;
   // Let the start of the interval stand for all of it: neighbours change by hundredths of a kelvin.
   drive.longwave_end_w_m2 = drive.longwave_begin_w_m2;
   for (std::size_t p = 0; p < kMaxPartners; ++p) {

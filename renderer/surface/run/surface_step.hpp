@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "surface/heat/body_view.hpp"
 #include "surface/heat/heat_interval.hpp"
 #include "surface/heat/sample_heat.hpp"
 #include "surface/heat/surface_samples.hpp"
@@ -23,6 +24,8 @@ struct SurfaceStep {
   const CasterRays& rays;
   std::span<const EntityFaces> faces;  ///< by entity; if empty, entities send what surroundings do
   std::span<const double> body_k;      ///< by body: interior, mean over the interval; offsets
+  /// Views by entity of what the warm-up did not see there; empty while no entity has moved.
+  std::span<const BodyView> views{};
 };
 
 /// Result of a step of a sample. `behind` is the output of a sheet's other face, which has the same

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: Apache-2.0
+// Bodies that come and go: each exchanges radiation with what stands there now. A run in which they
+// move is compared with one that starts with everything in its last place.
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "support/cached_session.hpp"
+
+namespace emit::test {
+namespace {
+
+using PartKind = scene::PartCommand::Kind;
+
+constexpr double kAirTemperatureK = 290.0;
+constexpr double kHotBodyK = 420.0;
+constexpr std::int64_t kMoveNs = 2 * kHourNs;
+constexpr std::int64_t kShownNs = kMoveNs + 1800 * kSecondNs;
+constexpr glm::dvec3 kFarAway{0.0, 300.0, 0.0};
+
+/// Open ground at night under a cold sky. All surfaces follow within minutes.
+scene::ScenarioDesc night() {
+  scene::ScenarioDesc s = cached_scenario(write_quads("night", {ground(30.0, 30.0)}));
+  scene::WeatherSample air = weather(0.0, 0.0, 280.0, kAirTemperatureK);
+  air.film_w_m2_k = 8.0;
+  s.weather = {air};
+  scene::Material& skin = s.materials[0];
+  skin.base_k = kAirTemperatureK;
+  skin.layers = {{0.001, 200.0, 2700, 900}, {0.2, 0.03, 20, 1000}};
+  skin.emissivity_frac = 0.9;
+  skin.modes.clear();
+  return s;
+}
+
+/// Adds a box of 2 m x 2 m x 1.6 m with its middle over a place. With a temperature its skin is
+/// held at it.
+void add_box(scene::ScenarioDesc& s, std::uint32_t id, double held_k = 0.0) {
+  const std::string name = "box" + std::to_string(id);
+  scene::ObjectDesc body = s.objects.front();
+  body.name = name;
+  body.gltf = write_quads(name, box({-1.0, -1.0, 0.2}, {1.0, 1.0, 1.8}));
+  body.entity_id = id;
+  if (held_k > 0.0) {
+    scene::Material hot = s.materials[0];
+    hot.name = name;
+    s.materials.push_back(hot);
+    body.material = name;
+    body.parts = {{1, "hull", name, {}, {{0, {PartKind::temperature, held_k}}}}};
+  }
+  s.objects.push_back(body);
+}
+
+physics::Pose stands_at(const scene::ScenarioDesc& s, const glm::dvec3& at_m) {
+  physics::Pose pose = s.objects.front().instances.front();
+  pose.position_world_m = at_m;
+  return pose;
+}
+
+/// Lets the newest object stand at a place until it jumps to another one.
+void jumps(scene::ScenarioDesc& s, const glm::dvec3& from_m, const glm::dvec3& to_m) {
+  scene::ObjectDesc& body = s.objects.back();
+  body.instances = {stands_at(s, from_m)};
+  body.trajectory = {{0, stands_at(s, from_m), true, false},
+                     {kMoveNs, stands_at(s, from_m), true, false},
+                     {kMoveNs + kSecondNs / 10, stands_at(s, to_m), true, true}};
+}
+void stays(scene::ScenarioDesc& s, const glm::dvec3& at_m) {
+  s.objects.back().instances = {stands_at(s, at_m)};
+}
+
+/// Mean temperature of the pixels in the middle of an image from a place at the end of the time.
+double seen_k(const scene::ScenarioDesc& s, const glm::dvec3& from_m, const glm::dvec3& at_m) {
+  Session run(s);
+  const physics::Pose eye = looking(from_m, at_m);
+  std::vector<float> frame;
+  for (std::int64_t now_ns = kMoveNs - kSecondNs; now_ns < kShownNs; now_ns += 2 * kSecondNs) {
+    frame = run.frame_k(now_ns, eye);
+  }
+  double sum_k = 0.0;
+  int count = 0;
+  for (std::uint32_t y = kHeight / 2 - 6; y < kHeight / 2 + 6; ++y) {
+    for (std::uint32_t x = kWidth / 2 - 6; x < kWidth / 2 + 6; ++x) {
+      sum_k += static_cast<double>(frame[y * kWidth + x]);
+      ++count;
+    }
+  }
+  return sum_k / count;
+}
+
+constexpr glm::dvec3 kEast{1.0, 0.0, 1.0};    ///< middle of the east side of a box at the origin
+constexpr glm::dvec3 kBeside{4.0, 0.0, 0.0};  ///< place of a box 2 m east of it
+double east_side_k(const scene::ScenarioDesc& s) {
+  return seen_k(s, kEast + glm::dvec3(0.7, 0.05, 0.3), kEast);
+}
+
+TEST(RendererCachedArrival, ABodyThatComesToAHotWallIsWarmedByIt) {
+  const auto world = [] {
+    // Stand a wall of 6 m x 4 m at x = 2.5 m, which looks west.
+    scene::ScenarioDesc s = night();
+    scene::Material hot = s.materials[0];
+    hot.name = "wall";
+    hot.prescribed_k = kHotBodyK;
+    s.materials.push_back(hot);
+    scene::ObjectDesc wall = s.objects.front();
+    wall.name = wall.material = "wall";
+    wall.gltf = write_quads(
+        "wall", {{{2.5, 3.0, 0.0}, {2.5, -3.0, 0.0}, {2.5, -3.0, 4.0}, {2.5, 3.0, 4.0}}});
+    s.objects.push_back(wall);
+    return s;
+  };
+  scene::ScenarioDesc s = world();
+  add_box(s, 7);
+  jumps(s, kFarAway, {0.0, 0.0, 0.0});
+  scene::ScenarioDesc fresh = world();
+  add_box(fresh, 7);
+  stays(fresh, {0.0, 0.0, 0.0});
+  scene::ScenarioDesc alone = world();
+  add_box(alone, 7);
+  stays(alone, kFarAway);
+  const double came_k = east_side_k(s);
+  const double stood_k = east_side_k(fresh);
+  const double cold_k =
+      seen_k(alone, kFarAway + kEast + glm::dvec3(0.7, 0.05, 0.3), kFarAway + kEast);
+  EXPECT_GT(stood_k, cold_k + 5.0);
+  EXPECT_NEAR(came_k, stood_k, 0.03 * (stood_k - cold_k));
+}
+
+TEST(RendererCachedArrival, AHotBodyThatComesWarmsOneThatStandsThere) {
+  scene::ScenarioDesc s = night();
+  add_box(s, 7);
+  stays(s, {0.0, 0.0, 0.0});
+  add_box(s, 8, kHotBodyK);
+  jumps(s, kFarAway, kBeside);
+  scene::ScenarioDesc fresh = night();
+  add_box(fresh, 7);
+  stays(fresh, {0.0, 0.0, 0.0});
+  add_box(fresh, 8, kHotBodyK);
+  stays(fresh, kBeside);
+  scene::ScenarioDesc before = night();
+  add_box(before, 7);
+  stays(before, {0.0, 0.0, 0.0});
+  const double came_k = east_side_k(s);
+  const double stood_k = east_side_k(fresh);
+  const double cold_k = east_side_k(before);
+  EXPECT_GT(stood_k, cold_k + 5.0);
+  EXPECT_NEAR(came_k, stood_k, 0.1 * (stood_k - cold_k));
+}
+
+TEST(RendererCachedArrival, AHotBodyThatLeavesNoLongerWarmsWhatItLeft) {
+  scene::ScenarioDesc s = night();
+  add_box(s, 7);
+  stays(s, {0.0, 0.0, 0.0});
+  add_box(s, 8, kHotBodyK);
+  jumps(s, kBeside, kFarAway);
+  scene::ScenarioDesc fresh = night();
+  add_box(fresh, 7);
+  stays(fresh, {0.0, 0.0, 0.0});
+  const double left_k = east_side_k(s);
+  const double cold_k = east_side_k(fresh);
+  // The insulation behind the skin still remembers some tenths.
+  EXPECT_NEAR(left_k, cold_k, 1.0);
+}
+
+TEST(RendererCachedArrival, TheGroundUnderABodyThatLeftForgetsIt) {
+  scene::ScenarioDesc s = night();
+  add_box(s, 8, kHotBodyK);
+  jumps(s, {0.0, 0.0, 0.0}, kFarAway);
+  const scene::ScenarioDesc fresh = night();
+  const glm::dvec3 eye{0.3, 0.0, 3.0};
+  EXPECT_NEAR(seen_k(s, eye, {0.3, 0.01, 0.0}), seen_k(fresh, eye, {0.3, 0.01, 0.0}), 0.3);
+}
+
+}  // namespace
+}  // namespace emit::test
