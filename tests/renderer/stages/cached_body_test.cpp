@@ -60,7 +60,7 @@ struct Balance {
   double interior_k = kStartK;  ///< in balance with shell and ventilation at the start
 
   void advance(const scene::BodyInterior& interior, double air_k, double sky_w_m2,
-               double film_w_m2_k, std::int64_t seconds) {
+               double film_w_m2_k, std::int64_t seconds, double power_w_m2 = 0.0) {
     constexpr double kEmissivity = 0.9;
     const double shell_j_m2_k =
         kSteel.thickness_m * kSteel.density_kg_m3 * kSteel.specific_heat_j_kg_k +
@@ -71,7 +71,7 @@ struct Balance {
       const double inwards_w_m2 = inside_w_m2_k * (shell_k - interior_k);
       const double emitted_w_m2 = physics::kStefanBoltzmannWPerM2K4 * std::pow(shell_k, 4.0);
       shell_k += (kEmissivity * (sky_w_m2 - emitted_w_m2) + film_w_m2_k * (air_k - shell_k) -
-                  inwards_w_m2) /
+                  inwards_w_m2 + power_w_m2) /
                  shell_j_m2_k;
       interior_k += (inwards_w_m2 + interior.ventilation_w_m2_k * (air_k - interior_k)) /
                     interior.heat_j_m2_k;
@@ -157,6 +157,37 @@ TEST(RendererBody, FollowsWeatherThatTheHostSends) {
     if (minute <= 65) continue;
     EXPECT_NEAR(shell_k, truth.shell_k, 0.4) << minute;
   }
+}
+
+TEST(RendererBody, AnEngineWarmsTheInteriorAndTheParkedBodyCoolsDown) {
+  using Kind = scene::PartCommand::Kind;
+  constexpr double kPowerW_m2 = 300.0;
+  const scene::BodyInterior interior{20'000.0, 0.5};
+  auto scenario = night(interior);
+  scenario.objects[0].entity_id = 7;
+  scenario.objects[0].parts = {{1, "engine", scenario.materials[0].name, {}, {}}};
+  const double film = film_w_m2_k(scenario);
+  const double sky_w_m2 = scenario.weather[0].longwave_down_w_m2;
+  Balance truth;
+  truth.advance(interior, kAirK, sky_w_m2, film, 3600);
+  BodyRun run(scenario);
+  EXPECT_NEAR(run.shell_k(60 * kMinuteNs), truth.shell_k, 0.4);
+  double hottest_k = 0.0;
+  for (int minute = 61; minute <= 180; ++minute) {
+    // Run the engine for an hour.
+    const bool runs = minute <= 120;
+    if (minute == 61 || minute == 121) {
+      const scene::PartCommand command{runs ? Kind::power : Kind::off, runs ? kPowerW_m2 : 0.0};
+      ASSERT_TRUE(run.renderer().apply_part((minute - 1) * kMinuteNs, {7, 1, command}));
+    }
+    truth.advance(interior, kAirK, sky_w_m2, film, 60, runs ? kPowerW_m2 : 0.0);
+    const float shell_k = run.shell_k(minute * kMinuteNs);
+    hottest_k = std::max(hottest_k, truth.shell_k);
+    // Frames a minute apart lie on the lines between nodes.
+    if (minute % 60 <= 5) continue;
+    EXPECT_NEAR(shell_k, truth.shell_k, 0.5) << minute;
+  }
+  EXPECT_GT(hottest_k, kAirK + 15.0);
 }
 
 TEST(RendererBody, KeepsABaseThatTheUserStates) {
