@@ -98,6 +98,7 @@ struct SceneSolver::Data {
   Result<std::vector<PixelHit>> see(const SolveView& view, SolvedImage& image,
                                     std::vector<glm::dvec3>& sky_rays) const;
   Result<void> choose_dimension(bool& three);
+  void note_interiors_and_parts();
   Result<void> check_instant(std::int64_t sim_time_ns) const;
   Result<std::vector<double>> temperatures(std::vector<PixelHit>& hits, std::int64_t sim_time_ns);
   std::optional<PixelHit> surface_at(const SceneInstant& instant, const SolveProbe& probe,
@@ -181,6 +182,7 @@ Result<void> SceneSolver::Data::choose_dimension(bool& three) {
                       "solve: thermal.lateral = false contradicts a solution in three dimensions, "
                       "which conducts along surfaces; ask for one dimension");
   }
+  note_interiors_and_parts();
   if (three) return {};
   // Name the keys that one dimension cannot follow.
   const bool moving = std::ranges::any_of(
@@ -194,6 +196,22 @@ Result<void> SceneSolver::Data::choose_dimension(bool& three) {
     notes.emplace_back("in one dimension [[contact]] has no effect: no body conducts to another");
   }
   return {};
+}
+
+/// Names what no solution follows: the interiors of bodies, and parts that heat themselves.
+void SceneSolver::Data::note_interiors_and_parts() {
+  for (const scene::Material& material : geometry.materials) {
+    if (!material.rests_on_body()) continue;
+    notes.push_back(
+        fmt::format("material '{}' rests on the interior of its body, which is held at {:.1f} K "
+                    "here",
+                    material.name, material.base_k));
+  }
+  for (const scene::ObjectDesc& object : scenario.objects) {
+    if (object.parts.empty()) continue;
+    notes.push_back(fmt::format(
+        "object '{}': [[object.parts]] has no effect, no part heats itself here", object.name));
+  }
 }
 
 /// Lets the history begin earlier than the scenario's. Three dimensions take the time before it on

@@ -174,6 +174,12 @@ TEST(ReferenceKeys, AutomaticDimensionSaysWhy) {
   open.scenario.contacts = {{{"wall", "ground"}, 0.1}};
   ASSERT_EQ(reason(open).notes.size(), 1U);
   EXPECT_NE(reason(open).notes[0].find("[[contact]]"), std::string::npos);
+  // Interiors and parts that heat themselves are named in any dimension.
+  t.geometry.materials[1].base = scene::BaseKind::body;
+  t.scenario.objects[0].parts.resize(1);
+  ASSERT_EQ(reason(t).notes.size(), 2U);
+  EXPECT_NE(reason(t).notes[0].find("'wall'"), std::string::npos);
+  EXPECT_NE(reason(t).notes[1].find("[[object.parts]]"), std::string::npos);
 }
 
 TEST(ReferenceKeys, SpinUpKnowsTheShadeOfTheWall) {
