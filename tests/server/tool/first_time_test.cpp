@@ -36,7 +36,7 @@ FirstRun run_daemon(const ScratchFolder& folder, const std::string& first_time) 
                "[[object]]\ngltf = \"share:scenes/box.glb\"\n"
                "[sensor]\nposition_m = [-6.0, -5.0, 5.0]\nlook_at_m = [0.0, 0.0, 0.5]\n"
                "width_px = 32\nheight_px = 24\n[thermal]\nmethod = \"cached\"\n"
-               "max_samples = 2000\n");
+               "max_samples = 2000\nhistory_start_s = 0\n");
   DaemonProcess daemon(
       folder,
       {"--config", folder.write("emitd.toml", "scenario = \"world.toml\"\n[source]\n" + first_time +
