@@ -26,6 +26,14 @@ inline constexpr std::string_view kRelaxationOutputs = "T_K";
 inline constexpr std::string_view kSunPositionInputs = "year,month,day,hours_ut,lat,lon,height,dT";
 inline constexpr std::string_view kSunPositionOutputs = "azimuth,elevation";
 
+inline constexpr std::string_view kAirPathInputs =
+    "model,vis_km,band,source,h_sensor_m,h_target_m,range_m";
+inline constexpr std::string_view kAirPathOutputs = "tau_band,path_radiance_w_m2_sr";
+inline constexpr std::string_view kAirSkyInputs = "model,vis_km,band,h_sensor_m,elevation_deg";
+inline constexpr std::string_view kAirSkyOutputs = "tau_flat,tau_sun,sky_radiance_w_m2_sr";
+inline constexpr std::string_view kAirSunInputs = "model,vis_km,band,sun_elevation_deg";
+inline constexpr std::string_view kAirSunOutputs = "e_ground_w_m2";
+
 inline constexpr std::string_view kSunDiscInputs = "delta_deg";
 inline constexpr std::string_view kSunDiscOutputs = "f";
 inline constexpr std::string_view kWallShadowInputs = "H,e_deg,x";
@@ -54,6 +62,12 @@ inline constexpr std::string_view kSurfaceHistoryOutputs = "Ts0,Ts1,Ts2,Ts3";
                                                           const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_sun_position(const EvaluateRequest& request,
                                                             const physics::CsvTable& table);
+[[nodiscard]] physics::Result<std::string> run_air_path(const EvaluateRequest& request,
+                                                        const physics::CsvTable& table);
+[[nodiscard]] physics::Result<std::string> run_air_sky(const EvaluateRequest& request,
+                                                       const physics::CsvTable& table);
+[[nodiscard]] physics::Result<std::string> run_air_sun(const EvaluateRequest& request,
+                                                       const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_sun_disc(const EvaluateRequest& request,
                                                         const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_wall_shadow(const EvaluateRequest& request,

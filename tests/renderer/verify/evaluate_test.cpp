@@ -43,11 +43,37 @@ class Evaluate : public testing::Test {
 TEST_F(Evaluate, ListsItsModels) {
   std::vector<std::string_view> names;
   for (const ModelInfo& model : models()) names.push_back(model.name);
-  EXPECT_THAT(names, testing::UnorderedElementsAre("equilibrium", "balance", "band-radiance",
-                                                   "relaxation", "sun-position", "sun-disc",
-                                                   "wall-shadow", "sky-view", "conduction-slab",
-                                                   "conduction-semi-infinite", "conduction-layered",
-                                                   "conduction-lateral", "surface-history"));
+  EXPECT_THAT(names, testing::UnorderedElementsAre(
+                         "equilibrium", "balance", "band-radiance", "relaxation", "sun-position",
+                         "sun-disc", "wall-shadow", "sky-view", "conduction-slab",
+                         "conduction-semi-infinite", "conduction-layered", "conduction-lateral",
+                         "surface-history", "air-path", "air-sky", "air-sun"));
+}
+
+TEST_F(Evaluate, AirGivesOneRowForEachRowAndNamesWhatItDoesNotKnow) {
+  const std::string path = "model,vis_km,band,source,h_sensor_m,h_target_m,range_m\n";
+  const auto clear = evaluate(request("air-path", path + "tropical,23,8-12,300K,5,5,0\n"
+                                                         "tropical,23,8-12,flat,5,5,nan\n"));
+  ASSERT_TRUE(clear.has_value()) << clear.error().text;
+  EXPECT_THAT(*clear, testing::StartsWith("tau_band,path_radiance_w_m2_sr\n"));
+  EXPECT_THAT(*clear, testing::EndsWith("\nnan,nan\n"));
+  for (const auto& [row, fault] :
+       {std::pair{"martian,23,8-12,flat,0,0,1\n", "in.csv:2: column 'model': 'martian'"},
+        std::pair{"tropical,23,1-2,flat,0,0,1\n", "in.csv:2: column 'band': '1-2'"},
+        std::pair{"tropical,0.1,8-12,flat,0,0,1\n", "in.csv:2: column 'vis_km'"},
+        std::pair{"tropical,23,8-12,lamp,0,0,1\n", "in.csv:2: column 'source': 'lamp'"}}) {
+    const auto bad = evaluate(request("air-path", path + row));
+    ASSERT_FALSE(bad.has_value()) << row;
+    EXPECT_THAT(bad.error().text, HasSubstr(fault));
+  }
+  const auto sky = evaluate(
+      request("air-sky", "model,vis_km,band,h_sensor_m,elevation_deg\nus_standard,5,3-5,2,90\n"));
+  ASSERT_TRUE(sky.has_value()) << sky.error().text;
+  EXPECT_THAT(*sky, testing::StartsWith("tau_flat,tau_sun,sky_radiance_w_m2_sr\n0."));
+  const auto sun =
+      evaluate(request("air-sun", "model,vis_km,band,sun_elevation_deg\nus_standard,5,3-5,-1\n"));
+  ASSERT_TRUE(sun.has_value()) << sun.error().text;
+  EXPECT_EQ(*sun, "e_ground_w_m2\n0\n");
 }
 
 TEST_F(Evaluate, RowsKeepTheirOrderAndExtraColumnsAreIgnored) {

@@ -4,8 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <random>
+#include <vector>
 
+#include "emit/physics/csv.hpp"
 #include "emit/physics/equilibrium.hpp"
 #include "emit/physics/surface_balance.hpp"
 #include "gpu_rows.hpp"
@@ -51,6 +55,78 @@ TEST(ShaderLib, BandRadianceWithinOneInTenThousandFrom200KelvinUp) {
         // zero.
         EXPECT_NEAR(c.got[i], c.expected[i], 1e-3 * c.expected[i] + 1e-30)
             << name << " at " << temperature[i] << " K";
+      }
+    }
+  }
+}
+
+/// Columns of an evaluated model.
+physics::CsvTable air_rows(const char* model, const std::filesystem::path& table,
+                           Precision precision, Device device) {
+  verify::EvaluateRequest request;
+  request.model = model;
+  request.table = table;
+  request.precision = precision;
+  request.device = device;
+  const auto result = verify::evaluate(request);
+  EXPECT_TRUE(result) << result.error().text;
+  auto rows = physics::CsvTable::parse(result ? *result : "", "result");
+  EXPECT_TRUE(rows) << rows.error().text;
+  return std::move(*rows);
+}
+
+TEST(ShaderLib, AirAgreesWithItsTwinAndWithTheModel) {
+  const auto folder = std::filesystem::path(EMIT_TEST_BINARY_DIR) / "shader_lib_test";
+  std::filesystem::create_directories(folder);
+  std::ofstream paths(folder / "path.csv");
+  paths << "model,vis_km,band,source,h_sensor_m,h_target_m,range_m\n";
+  std::ofstream skies(folder / "sky.csv");
+  skies << "model,vis_km,band,h_sensor_m,elevation_deg\n";
+  std::ofstream suns(folder / "sun.csv");
+  suns << "model,vis_km,band,sun_elevation_deg\n";
+  for (const char* band : {"3-5", "3.4-4.1", "8-12", "7.7-9.3"}) {
+    for (const double sensor_m : {0.0, 70.0, 2000.0, 9000.0}) {
+      for (const double target_m : {0.0, 500.0, 4300.0}) {
+        for (const double beyond_m : {3.0, 200.0, 6000.0, 40000.0}) {
+          for (const char* source : {"300K", "800K", "sun", "flat"}) {
+            paths << "midlatitude_summer,23," << band << ',' << source << ',' << sensor_m << ','
+                  << target_m << ',' << std::hypot(beyond_m, target_m - sensor_m) << '\n';
+          }
+        }
+      }
+      for (const double elevation_deg : {-0.2, 0.5, 5.0, 30.0, 90.0}) {
+        skies << "midlatitude_summer,23," << band << ',' << sensor_m << ',' << elevation_deg
+              << '\n';
+      }
+    }
+    for (const double elevation_deg : {-1.0, 5.0, 20.0, 70.0}) {
+      suns << "midlatitude_summer,23," << band << ',' << elevation_deg << '\n';
+    }
+  }
+  paths.close();
+  skies.close();
+  suns.close();
+  struct Case {
+    const char* model;
+    const char* file;
+    std::vector<const char*> columns;
+  };
+  for (const Case& c : {Case{"air-path", "path.csv", {"tau_band", "path_radiance_w_m2_sr"}},
+                        Case{"air-sky", "sky.csv", {"tau_flat", "tau_sun", "sky_radiance_w_m2_sr"}},
+                        Case{"air-sun", "sun.csv", {"e_ground_w_m2"}}}) {
+    const auto exact = air_rows(c.model, folder / c.file, Precision::float64, Device::cpu);
+    const auto twin = air_rows(c.model, folder / c.file, Precision::float32, Device::cpu);
+    const auto shader = air_rows(c.model, folder / c.file, Precision::float32, Device::gpu);
+    for (const char* name : c.columns) {
+      const auto want = *exact.numbers(name);
+      const auto close = *twin.numbers(name);
+      const auto got = *shader.numbers(name);
+      ASSERT_EQ(got.size(), want.size());
+      for (std::size_t i = 0; i < want.size(); ++i) {
+        EXPECT_NEAR(got[i], close[i], 2e-4 * close[i] + 1e-7) << c.model << ' ' << name << i;
+        // The table between its nodes.
+        const double bound = name[0] == 't' ? 0.012 : 0.05 * want[i] + 1e-9;
+        EXPECT_NEAR(got[i], want[i], bound) << c.model << ' ' << name << ' ' << i;
       }
     }
   }

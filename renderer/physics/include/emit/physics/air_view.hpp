@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "emit/physics/air_model.hpp"
+
+/// The air model as the shader reads it: a small table around the sensor (physics.md eq. 28). The
+/// shader evaluates the same equations in float32 (shaders/lib/air_view.glsl).
+namespace emit::physics {
+
+/// Air of one band for sensors at any height. at() makes the table of one sensor height out of
+/// slices that build() prepared.
+/// Axes: the heights of sensor and target have nodes every 250 m up to 2 km, 500 m up to 3 km, 1 km
+/// up to 12 km and 5 km up to 22 km; the range is uniform in its logarithm, the elevation in
+/// asinh(sin e / kElevationScale). All are clamped at their ends.
+class AirView {
+ public:
+  static constexpr std::size_t kHeights = 22;
+  static constexpr std::size_t kRanges = 29;
+  static constexpr std::size_t kElevations = 48;
+  static constexpr std::size_t kNodes = kHeights * kRanges + kElevations;
+  static constexpr double kNearestM = 1.0;
+  static constexpr double kFarthestM = 100000.0;
+  static constexpr double kElevationScale = 0.03;
+  static constexpr double kLowestSine = -0.17;
+
+  /// Node of a table. Along a line of sight the first three members hold the logarithm of the mean
+  /// extinction, m-1, for the three sources, and the last one the path radiance by 1 - tau of the
+  /// first source, W m-2 sr-1. Towards the sky the first three hold the optical depth to space, and
+  /// the last one the radiance of the sky.
+  using Node = std::array<float, 4>;
+  using Sources = std::array<AirSource, 3>;
+  /// Sources of a picture: surfaces near 300 K, hot surfaces, and what reflects the sun.
+  static constexpr Sources kPicture{AirSource::black_300k, AirSource::black_800k,
+                                    AirSource::sun_lowtran};
+
+  /// Band and sources of a view. The band must outlive the call of build().
+  struct Subject {
+    const BandAir* band = nullptr;
+    Sources sources = kPicture;
+  };
+  /// Makes the views of several subjects in one atmosphere, in their order. Setup only: some tens
+  /// of milliseconds.
+  [[nodiscard]] static std::vector<AirView> build(const AirColumn& column,
+                                                  std::span<const Subject> subjects);
+
+  /// Writes the table of a sensor at a height above sea level: the lines of sight
+  /// [target height][range], then the sky by elevation. The air at the ground is `warmer_k` warmer
+  /// than that of the climate; it is clamped to +-kMostWarmerK. RT-safe.
+  /// @pre out.size() == kNodes
+  void at(double sensor_m, double warmer_k, std::span<Node> out) const noexcept;
+  static constexpr double kMostWarmerK = 40.0;
+
+ private:
+  /// Node with the logarithm of its radiance for air that is colder, as the climate, and warmer.
+  struct Slice {
+    std::array<float, 3> air;
+    std::array<float, 3> log_radiance;
+  };
+  std::vector<Slice> slices_;  ///< [sensor][node]
+};
+
+/// Air between a sensor and a point, from a table.
+struct AirSight {
+  std::array<float, 3> transmittance_frac;  ///< by source
+  float path_radiance_w_m2_sr = 0.0F;
+};
+/// Looks up a line of sight of `range_m` to a target at a height above sea level, in float32 as the
+/// shader does. RT-safe.
+/// @pre table.size() == AirView::kNodes
+[[nodiscard]] AirSight air_sight(std::span<const AirView::Node> table, float target_m,
+                                 float range_m) noexcept;
+/// Looks up the sky in a direction. The path radiance is that of the sky. RT-safe.
+[[nodiscard]] AirSight air_sky(std::span<const AirView::Node> table, float sin_elevation) noexcept;
+
+}  // namespace emit::physics

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <span>
+#include <string_view>
+
+#include "emit/physics/air_model.hpp"
+
+/// Numbers of the air model (air_tables.cpp).
+namespace emit::physics::air_tables {
+
+/// Air of one climate at one height.
+struct Level {
+  double height_km;
+  double pressure_hpa;
+  double kelvin;
+  double vapour_g_m3;
+  double ozone_atm_cm_km;
+};
+inline constexpr std::size_t kLevels = 33;
+/// Returns the levels of a climate, from the ground upwards.
+[[nodiscard]] std::span<const Level, kLevels> levels(AirClimate climate) noexcept;
+
+/// Temperatures at which the weights of the thermal emission are given, K.
+inline constexpr std::array<double, 8> kEmissionK{180, 200, 220, 240, 260, 280, 300, 330};
+
+/// Terms of one band. Extinction is by unit of the absorbers' density (km of path).
+struct BandTerms {
+  std::string_view name;
+  double lo_um;
+  double hi_um;
+  double sun_w_m2;  ///< outside the atmosphere at 1 au, LOWTRAN7's spectrum
+  std::array<std::array<double, kAirAbsorbers>, kAirTerms> extinction;
+  std::array<std::array<double, kAirTerms>, kAirSources> weight;
+  std::array<std::array<double, kAirTerms>, kEmissionK.size()> emission_weight;
+};
+[[nodiscard]] std::span<const BandTerms> bands() noexcept;
+
+}  // namespace emit::physics::air_tables

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emit/physics/air_view.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "emit/physics/check.hpp"
+
+namespace emit::physics {
+namespace {
+
+constexpr std::array<double, 3> kWarmerK{-AirView::kMostWarmerK, 0.0, AirView::kMostWarmerK};
+
+/// Position on a uniform axis of `nodes` nodes from `first` to `last`.
+double view_axis(std::size_t i, std::size_t nodes, double first, double last) {
+  return first + (last - first) * static_cast<double>(i) / static_cast<double>(nodes - 1);
+}
+
+const double kFirstElevation = std::asinh(AirView::kLowestSine / AirView::kElevationScale);
+const double kLastElevation = std::asinh(1.0 / AirView::kElevationScale);
+
+constexpr std::array<double, AirView::kHeights> kHeightM{
+    0,    250,  500,  750,  1000, 1250, 1500,  1750,  2000,  2500,  3000,
+    4000, 5000, 6000, 7000, 8000, 9000, 10000, 11000, 12000, 17000, 22000};
+
+/// Place of a height on its axis, in nodes.
+float height_place(float height_m) noexcept {
+  const float km = height_m * 1e-3F;
+  return 4.0F * std::clamp(km, 0.0F, 2.0F) + 2.0F * std::clamp(km - 2.0F, 0.0F, 1.0F) +
+         std::clamp(km - 3.0F, 0.0F, 9.0F) + 0.2F * std::clamp(km - 12.0F, 0.0F, 10.0F);
+}
+
+double view_range_m(std::size_t i) {
+  return AirView::kNearestM *
+         std::pow(AirView::kFarthestM / AirView::kNearestM,
+                  static_cast<double>(i) / static_cast<double>(AirView::kRanges - 1));
+}
+
+double view_elevation_rad(std::size_t i) {
+  const double v = view_axis(i, AirView::kElevations, kFirstElevation, kLastElevation);
+  return std::asin(std::clamp(AirView::kElevationScale * std::sinh(v), -1.0, 1.0));
+}
+
+/// ViewCell of a uniform axis and the fraction of it. NaN counts as the start of the axis.
+struct ViewCell {
+  std::size_t index;
+  float fraction;
+};
+ViewCell view_cell(float place, std::size_t nodes) noexcept {
+  const float last = static_cast<float>(nodes - 1);
+  const float held = place > 0.0F ? std::min(place, last) : 0.0F;
+  const auto index = std::min(static_cast<std::size_t>(held), nodes - 2);
+  return {index, held - static_cast<float>(index)};
+}
+
+AirView::Node mix_nodes(const AirView::Node& a, const AirView::Node& b, float f) noexcept {
+  AirView::Node out;
+  for (std::size_t k = 0; k < out.size(); ++k) out[k] = a[k] + f * (b[k] - a[k]);
+  return out;
+}
+
+/// Returns 1 - exp(-x) for x >= 0 without cancellation, as the shader does.
+float view_opacity(float x) noexcept {
+  return x < 0.01F ? x * (1.0F - x * (0.5F - x / 6.0F)) : 1.0F - std::exp(-x);
+}
+
+}  // namespace
+
+std::vector<AirView> AirView::build(const AirColumn& column, std::span<const Subject> subjects) {
+  constexpr double kLeast = 1e-30;
+  std::vector<AirView> views(subjects.size());
+  // Evaluate a path for all subjects. A range of 0 stands for the path to space.
+  const auto add = [&](const AirPath& path, double range_m) {
+    const bool sky = range_m == 0.0;
+    for (std::size_t v = 0; v < subjects.size(); ++v) {
+      const auto sight = subjects[v].band->evaluate(path, subjects[v].sources, kWarmerK);
+      Slice slice{};
+      double opaque = 1.0;
+      for (std::size_t k = 0; k < slice.air.size(); ++k) {
+        const double tau = std::clamp(sight.transmittance_frac[k], kLeast, 1.0 - 1e-12);
+        if (k == 0 && !sky) opaque = 1.0 - tau;
+        slice.air[k] =
+            static_cast<float>(sky ? -std::log(tau) : std::log(-std::log(tau) / range_m));
+      }
+      for (std::size_t w = 0; w < kWarmerK.size(); ++w) {
+        slice.log_radiance[w] =
+            static_cast<float>(std::log(std::max(sight.path_radiance_w_m2_sr[w] / opaque, kLeast)));
+      }
+      views[v].slices_.push_back(slice);
+    }
+  };
+  for (const double sensor_m : kHeightM) {
+    for (const double target_m : kHeightM) {
+      for (std::size_t r = 0; r < kRanges; ++r) {
+        add(AirPath::between(column, sensor_m, target_m, view_range_m(r)), view_range_m(r));
+      }
+    }
+    for (std::size_t e = 0; e < kElevations; ++e) {
+      add(AirPath::to_space(column, sensor_m, view_elevation_rad(e)), 0.0);
+    }
+  }
+  return views;
+}
+
+void AirView::at(double sensor_m, double warmer_k, std::span<Node> out) const noexcept {
+  EMIT_DCHECK(out.size() == kNodes);
+  const ViewCell sensor = view_cell(height_place(static_cast<float>(sensor_m)), kHeights);
+  // Interpolate the logarithm of the radiance with the parabola through the three temperatures.
+  const float x = static_cast<float>(std::clamp(warmer_k / kMostWarmerK, -1.0, 1.0));
+  const std::array<float, 3> share{0.5F * x * (x - 1.0F), 1.0F - x * x, 0.5F * x * (x + 1.0F)};
+  const Slice* low = &slices_[sensor.index * kNodes];
+  const Slice* high = low + kNodes;
+  for (std::size_t i = 0; i < kNodes; ++i) {
+    const auto log_radiance = [&share](const Slice& slice) {
+      return share[0] * slice.log_radiance[0] + share[1] * slice.log_radiance[1] +
+             share[2] * slice.log_radiance[2];
+    };
+    const float a = log_radiance(low[i]);
+    for (std::size_t k = 0; k < 3; ++k) {
+      out[i][k] = low[i].air[k] + sensor.fraction * (high[i].air[k] - low[i].air[k]);
+    }
+    out[i][3] = std::exp(a + sensor.fraction * (log_radiance(high[i]) - a));
+  }
+}
+
+AirSight air_sight(std::span<const AirView::Node> table, float target_m, float range_m) noexcept {
+  static const float kPerRange = static_cast<float>(
+      (AirView::kRanges - 1) / std::log(AirView::kFarthestM / AirView::kNearestM));
+  const ViewCell target = view_cell(height_place(target_m), AirView::kHeights);
+  const ViewCell range = view_cell(
+      std::log(std::max(range_m, 1e-3F) / static_cast<float>(AirView::kNearestM)) * kPerRange,
+      AirView::kRanges);
+  const auto row = [&](std::size_t t) {
+    const std::size_t i = t * AirView::kRanges + range.index;
+    return mix_nodes(table[i], table[i + 1], range.fraction);
+  };
+  const AirView::Node node = mix_nodes(row(target.index), row(target.index + 1), target.fraction);
+  AirSight out;
+  for (std::size_t k = 0; k < 3; ++k) {
+    out.transmittance_frac[k] = std::exp(-std::exp(node[k]) * range_m);
+  }
+  out.path_radiance_w_m2_sr = view_opacity(std::exp(node[0]) * range_m) * node[3];
+  return out;
+}
+
+AirSight air_sky(std::span<const AirView::Node> table, float sin_elevation) noexcept {
+  static const float kFirst = static_cast<float>(kFirstElevation);
+  static const float kPerNode =
+      static_cast<float>((AirView::kElevations - 1) / (kLastElevation - kFirstElevation));
+  const float x = sin_elevation / static_cast<float>(AirView::kElevationScale);
+  // asinh() of a negative argument would cancel.
+  const float root = std::log(std::abs(x) + std::sqrt(x * x + 1.0F));
+  const ViewCell place =
+      view_cell(((x < 0.0F ? -root : root) - kFirst) * kPerNode, AirView::kElevations);
+  const std::size_t i = AirView::kHeights * AirView::kRanges + place.index;
+  const AirView::Node node = mix_nodes(table[i], table[i + 1], place.fraction);
+  AirSight out;
+  for (std::size_t k = 0; k < 3; ++k) out.transmittance_frac[k] = std::exp(-node[k]);
+  out.path_radiance_w_m2_sr = node[3];
+  return out;
+}
+
+}  // namespace emit::physics
