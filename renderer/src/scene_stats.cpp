@@ -31,6 +31,12 @@ std::vector<std::string> warm_up_warnings(const SceneStats& stats) {
         "asks. Set it to {} or more",
         stats.max_samples, suggested(stats.max_samples)));
   }
+  if (stats.exchange_left_w_m2 > 0.0) {
+    out.push_back(fmt::format(
+        "the radiation between surfaces did not settle in the warm-up: {:.3g} W/m2 are left, so "
+        "that surfaces which face each other may be off by kelvins",
+        stats.exchange_left_w_m2));
+  }
   if (stats.coarse_meshes) {
     out.emplace_back(
         "thermal.max_samples is too small for the meshes: outlines are up to two pixels off");

@@ -245,6 +245,7 @@ void CachedStage::describe(SceneStats& stats) const noexcept {
   stats.samples = surface_->model().samples.samples.size();
   stats.sample_bytes = surface_->sample_bytes();
   stats.samples_full = surface_->model().full;
+  stats.exchange_left_w_m2 = surface_->model().exchange_left_w_m2;
   stats.max_samples = max_samples_;
   stats.coarse_meshes = visibly_simplified_;
 }

@@ -55,8 +55,11 @@ struct SurfaceModel {
   std::vector<SampleState> states;    ///< states at the end of the record
   std::vector<SampleOutput> outputs;  ///< outputs at the end of the record
   std::vector<double> body_k;         ///< interiors of bodies there, from the reference temperature
-  bool full = false;                  ///< the refinement stopped at max_samples
-  bool full_in_view = false;          ///< surfaces in the field of view were then still too coarse
+  /// Largest residual of the exchange where it is above the limit of the warm-up, W/m2; otherwise
+  /// 0.
+  double exchange_left_w_m2 = 0.0;
+  bool full = false;          ///< the refinement stopped at max_samples
+  bool full_in_view = false;  ///< surfaces in the field of view were then still too coarse
 };
 
 /// Callback that receives the fraction done, 0 to 1. The builder stops if it returns false.

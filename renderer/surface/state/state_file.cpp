@@ -121,6 +121,7 @@ void put_model(Sink& sink, const SurfaceModel& model) {
   put_value(sink, model.states);
   put_value(sink, model.outputs);
   put_value(sink, model.body_k);
+  put_value(sink, model.exchange_left_w_m2);
   put_value(sink, model.full);
   put_value(sink, model.full_in_view);
 }
@@ -399,6 +400,7 @@ Result<SurfaceModel> read_state(const std::filesystem::path& file, const StateWa
   take_value(source, model.states);
   take_value(source, model.outputs);
   take_value(source, model.body_k);
+  take_value(source, model.exchange_left_w_m2);
   take_value(source, model.full);
   take_value(source, model.full_in_view);
   // Check all indices: a file with a matching checksum may still be made by a faulty program.

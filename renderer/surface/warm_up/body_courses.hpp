@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -39,6 +40,12 @@ class BodyCourses {
            const SampleState& state) noexcept {
     inflow_w_[row_of_group_[group] * (intervals_ + 1) + node] +=
         bodies_.inflow_w(all_, sample, state);
+  }
+  /// Forgets the inflow of a group over intervals from `first` on, before it is added again. The
+  /// node at which the first of them begins keeps it, except at the begin of the record.
+  void forget(std::size_t group, std::size_t first, std::size_t count) noexcept {
+    double* const row_w = &inflow_w_[row_of_group_[group] * (intervals_ + 1)];
+    std::fill(row_w + (first == 0 ? 0 : first + 1), row_w + first + count + 1, 0.0);
   }
   /// Finds the courses that follow from the inflow, and forgets it.
   void correct() noexcept;

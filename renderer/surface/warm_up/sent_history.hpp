@@ -33,14 +33,19 @@ class SentRow {
     values_[intervals_ + 1 + interval] = output.shortwave_out_w_m2;
   }
 
-  /// Part of the row that other samples receive: the long wave at all nodes, then the sunlight of
-  /// all intervals.
-  [[nodiscard]] std::span<const float> radiation_w_m2() const noexcept {
-    return {values_, 2 * intervals_ + 1};
-  }
   [[nodiscard]] float longwave_w_m2(std::size_t node) const noexcept { return values_[node]; }
+  [[nodiscard]] float shortwave_w_m2(std::size_t interval) const noexcept {
+    return values_[intervals_ + 1 + interval];
+  }
   [[nodiscard]] float flux_w_m2(std::size_t node) const noexcept {
     return values_[2 * intervals_ + 1 + node];
+  }
+  void keep_longwave(std::size_t node, float w_m2) const noexcept { values_[node] = w_m2; }
+  void keep_shortwave(std::size_t interval, float w_m2) const noexcept {
+    values_[intervals_ + 1 + interval] = w_m2;
+  }
+  void keep_flux(std::size_t node, float w_m2) const noexcept {
+    values_[2 * intervals_ + 1 + node] = w_m2;
   }
 
  private:

@@ -454,9 +454,12 @@ physics::Result<SurfaceModel> Builder::run() {
     return report(kEvaluatedFrac + (1.0 - kEvaluatedFrac) * frac);
   };
   SampleHistories histories = take_histories(in_, std::move(patches_), model_);
-  const ExchangeOptions exchange_options{.sweeps = sampler_.keeps_sent() ? kExchangeSweeps : 0,
-                                         .exitance = options_.exchange};
-  if (!exchange(in_, exchange_options, std::move(histories), model_, exchanged)) return stopped();
+  if (sampler_.keeps_sent()) {
+    const ExchangeOptions exchange_options{.exitance = options_.exchange};
+    if (!exchange(in_, exchange_options, std::move(histories), model_, exchanged)) return stopped();
+  } else if (!report(1.0)) {
+    return stopped();
+  }
   replace_covered();
   return std::move(model_);
 }

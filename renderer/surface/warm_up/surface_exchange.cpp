@@ -13,6 +13,7 @@
 #include "surface/mesh/sheet_sides.hpp"
 #include "surface/model/entity_exitance.hpp"
 #include "surface/warm_up/body_courses.hpp"
+#include "surface/warm_up/fixed_point_mixer.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -20,97 +21,224 @@ namespace {
 /// Groups of samples in one task of a parallel loop.
 constexpr std::size_t kGrain = 8;
 constexpr std::uint32_t kNoList = 0xffffffffU;
+/// Intervals in a window: short enough that the radiation within it settles in few iterations and
+/// that its rows stay in the cache, long enough that sums over rows run at full width.
+constexpr std::size_t kWindow = 16;
+/// Iterations that take what the one before sent as it is; later ones are mixed.
+constexpr std::uint32_t kPlainIterations = 4;
+/// A list is taken anew when it has changed by more than this share of kExchangeResidual.
+constexpr double kRenewFrac = 0.5;
 
-/// Sum of the radiation of the seen samples of every list, over the whole history. The weights are
-/// those of SurfaceSamples::seen.
+/// What a pass over the record is for.
+enum class Pass : std::uint8_t {
+  bounce,   ///< carries all samples once, with the radiation of the first guess
+  courses,  ///< carries those that take a course from the pass before, once
+  settle,   ///< carries all samples until the radiation of every window has settled
+};
+
+/// Range of intervals of the record.
+struct Window {
+  std::size_t first = 0;
+  std::size_t count = 0;
+};
+
+/// Row of a sample over a window of `count` intervals: its long-wave exitance at every node, then
+/// the sunlight that it reflects in every interval, W/m2.
+constexpr std::size_t row_size(std::size_t count) noexcept {
+  return 2 * count + 1;
+}
+
+/// Radiation that lists of samples send towards those who see them, over a window. The sums are
+/// scaled to the viewer that is surrounded most.
 class SeenRadiation {
- public:
-  SeenRadiation(const SurfaceSamples& all, std::size_t row_size)
-      : all_(all), row_size_(row_size), list_of_entry_(all.seen.size(), kNoList) {
-    // Find the lists: samples that share a view share its first entry.
-    for (const SurfaceSample& sample : all.samples) {
-      if (sample.seen_count == 0 || list_of_entry_[sample.first_seen] != kNoList) continue;
-      list_of_entry_[sample.first_seen] = static_cast<std::uint32_t>(lists_.size());
-      lists_.push_back({sample.first_seen, sample.seen_count});
-    }
-    sums_w_m2_.resize(lists_.size() * row_size_);
+  template <class Values>
+  [[nodiscard]] auto row(Values& values, std::size_t list) const noexcept {
+    return std::span(values).subspan(list * row_size_, row_size_);
   }
 
-  /// Adds up the radiation in the rows `sent`, by sample, list by list. Uses all cores.
-  void gather(std::span<const SentRow> sent) {
-    constexpr std::size_t kListGrain = 16;
+ public:
+  explicit SeenRadiation(const SurfaceSamples& all)
+      : all_(all), list_of_entry_(all.seen.size(), kNoList) {
+    // Find the lists: samples that share a view share its first entry.
+    for (const SurfaceSample& sample : all.samples) {
+      if (sample.seen_count == 0) continue;
+      std::uint32_t& list = list_of_entry_[sample.first_seen];
+      if (list == kNoList) {
+        list = static_cast<std::uint32_t>(lists_.size());
+        lists_.push_back({sample.first_seen, sample.seen_count});
+      }
+      lists_[list].scale = std::max(lists_[list].scale, sample.seen_scale);
+    }
+    renewed_.resize(lists_.size());
+  }
+
+  /// Begins a window and takes what the rows `sent`, by sample, add up to. Uses all cores.
+  void begin(std::span<const float> sent, std::size_t count) {
+    row_size_ = row_size(count);
+    taken_w_m2_.resize(lists_.size() * row_size_);
+    fresh_w_m2_.resize(lists_.size() * row_size_);
+    gather(sent);
+    taken_w_m2_ = fresh_w_m2_;
+    mixer_.reset();
+  }
+  /// Adds up the rows `sent` again. Returns how far the sums are from those that were taken, W/m2.
+  [[nodiscard]] double look(std::span<const float> sent) {
+    gather(sent);
+    const auto value = [this](std::size_t i) { return off_w_m2(i); };
+    float most_w_m2 = 0.0F;
+    // The greatest difference does not depend on the order.
+    off_w_m2_.resize(lists_.size());
+    threads::parallel_parts(lists_.size(), kListGrain, [&](std::size_t from, std::size_t to) {
+      for (std::size_t i = from; i < to; ++i) off_w_m2_[i] = value(i);
+    });
+    for (const float off_w_m2 : off_w_m2_) most_w_m2 = std::max(most_w_m2, off_w_m2);
+    return most_w_m2;
+  }
+  /// Takes the sums that look() has found, mixed with earlier ones or as they are. Lists whose sums
+  /// have hardly changed keep them.
+  void take(bool mixed) {
+    if (mixed) mixer_.mix(taken_w_m2_, fresh_w_m2_);
     threads::parallel_parts(lists_.size(), kListGrain, [&](std::size_t from, std::size_t to) {
       for (std::size_t i = from; i < to; ++i) {
-        const std::span<double> sum_w_m2 = std::span(sums_w_m2_).subspan(i * row_size_, row_size_);
-        std::ranges::fill(sum_w_m2, 0.0);
-        for (std::uint32_t k = 0; k < lists_[i].count; ++k) {
-          const SeenSample& seen = all_.seen[lists_[i].first + k];
-          const double weight = seen.weight_frac;
-          const std::span<const float> row_w_m2 = sent[seen.sample].radiation_w_m2();
+        renewed_[i] = off_w_m2(i) > kRenewFrac * kExchangeResidual_w_m2 ? 1 : 0;
+        if (renewed_[i] == 0) continue;
+        std::ranges::copy(row(fresh_w_m2_, i), row(taken_w_m2_, i).begin());
+      }
+    });
+  }
+  /// Returns whether take() has changed what a sample receives.
+  [[nodiscard]] bool renewed(const SurfaceSample& sample) const noexcept {
+    return sample.seen_count != 0 && renewed_[list_of_entry_[sample.first_seen]] != 0;
+  }
+
+  /// What a sample receives: a row, and the factor on it. The row is empty if it sees nothing.
+  struct Received {
+    std::span<const float> row_w_m2;
+    double scale = 0.0;
+  };
+  [[nodiscard]] Received of(const SurfaceSample& sample) const noexcept {
+    if (sample.seen_count == 0) return {};
+    const std::size_t list = list_of_entry_[sample.first_seen];
+    if (!(lists_[list].scale > 0.0F)) return {};
+    return {row(taken_w_m2_, list), static_cast<double>(sample.seen_scale) / lists_[list].scale};
+  }
+
+ private:
+  static constexpr std::size_t kListGrain = 64;
+  /// Range of SurfaceSamples::seen, and the greatest scale of its viewers.
+  struct List {
+    std::uint32_t first = 0;
+    std::uint32_t count = 0;
+    float scale = 0.0F;
+  };
+  /// Greatest difference between the sums of a list and those that were taken.
+  [[nodiscard]] float off_w_m2(std::size_t list) const noexcept {
+    const std::span<const float> fresh_w_m2 = row(fresh_w_m2_, list);
+    const std::span<const float> taken_w_m2 = row(taken_w_m2_, list);
+    float most_w_m2 = 0.0F;
+    for (std::size_t k = 0; k < row_size_; ++k) {
+      most_w_m2 = std::max(most_w_m2, std::abs(fresh_w_m2[k] - taken_w_m2[k]));
+    }
+    return most_w_m2;
+  }
+  void gather(std::span<const float> sent) {
+    threads::parallel_parts(lists_.size(), kListGrain, [&](std::size_t from, std::size_t to) {
+      for (std::size_t i = from; i < to; ++i) {
+        const List& list = lists_[i];
+        const std::span<float> sum_w_m2 = row(fresh_w_m2_, i);
+        std::ranges::fill(sum_w_m2, 0.0F);
+        for (std::uint32_t k = 0; k < list.count; ++k) {
+          const SeenSample& seen = all_.seen[list.first + k];
+          const float weight = list.scale * seen.weight_frac;
+          const float* const row_w_m2 = &sent[seen.sample * row_size_];
           for (std::size_t j = 0; j < row_size_; ++j) sum_w_m2[j] += weight * row_w_m2[j];
         }
       }
     });
   }
 
-  /// Returns the row of the list that a sample sees. It is empty if the sample sees nothing.
-  [[nodiscard]] std::span<const double> of(const SurfaceSample& sample) const noexcept {
-    if (sample.seen_count == 0) return {};
-    return std::span(sums_w_m2_).subspan(list_of_entry_[sample.first_seen] * row_size_, row_size_);
-  }
-
- private:
-  /// Range of SurfaceSamples::seen.
-  struct List {
-    std::uint32_t first = 0;
-    std::uint32_t count = 0;
-  };
   const SurfaceSamples& all_;
-  std::size_t row_size_;
+  std::size_t row_size_ = 0;
   std::vector<std::uint32_t> list_of_entry_;  ///< list that begins with an entry of `seen`
   std::vector<List> lists_;
-  std::vector<double> sums_w_m2_;  ///< by list: rows like SentRow::radiation_w_m2()
+  std::vector<float> taken_w_m2_;      ///< by list: the row that its viewers receive
+  std::vector<float> fresh_w_m2_;      ///< by list: the row that follows from what is sent
+  std::vector<float> off_w_m2_;        ///< by list: difference of both
+  std::vector<std::uint8_t> renewed_;  ///< by list: the latest take() has changed it
+  FixedPointMixer mixer_;
 };
 
-/// Integrates samples over the whole history, with what the others sent in the sweep before.
+/// Integrates samples over the record, window by window, with what the others send meanwhile.
 class Sweeper {
  public:
   Sweeper(const SurfaceInputs& inputs, const ExchangeOptions& options, SampleHistories histories,
           SurfaceModel& model);
 
-  /// Does one sweep over the samples that sweeps change.
-  void sweep();
+  /// Returns whether some samples take a course from the pass before: the flux of a partner, or the
+  /// interior of a body.
+  [[nodiscard]] bool takes_courses() const noexcept { return takes_courses_; }
+  /// Does a pass over the record. `report` receives the share of the pass that is done. Returns
+  /// false when it stopped.
+  [[nodiscard]] bool sweep(Pass pass, const SurfaceProgress& report);
 
  private:
-  /// Measures the radiation of the faces of entities at every node, from the latest sweep.
-  void measure_faces();
-  /// Returns true if no sweep changes the sample: it sees no other one, has no partner and no body,
+  /// Puts what is known of the radiation in a window into rows, as a guess.
+  void load(const Window& window);
+  /// Iterates a window.
+  void settle(const Window& window);
+  /// Keeps the rows and the states at the end of a window.
+  void store(const Window& window);
+  /// Makes the fluxes and the interiors of this pass those that the next one takes.
+  void take_courses();
+  /// Measures the radiation of the faces of entities at every node of a window. Returns by how much
+  /// it has changed since the call before, W/m2.
+  double measure_faces(const Window& window);
+  /// Returns whether a sample takes a course from the pass before.
+  [[nodiscard]] bool takes_course(std::uint32_t s) const noexcept {
+    return flux_row_[s] != kNoList || model_.samples.samples[s].body >= 0;
+  }
+  /// Advances those groups over a window of which `chosen(s)` is true for a sample.
+  template <class Chosen>
+  void carry_groups(const Window& window, const Chosen& chosen);
+  /// Returns whether the latest iteration has changed what a sample receives in a window.
+  [[nodiscard]] bool changed(std::uint32_t s, const Window& window,
+                             bool faces_changed) const noexcept;
+  /// Returns true if nothing changes the sample: it sees no other one, has no partner and no body,
   /// and no entity that sends radiation hides its sky.
   [[nodiscard]] bool alone(std::size_t s) const noexcept;
-  /// Input of sample `s` in interval j, without the fluxes of its partners.
-  [[nodiscard]] SampleDrive drive(std::size_t s, const glm::vec3& normal,
-                                  std::size_t j) const noexcept;
-  /// Adds the radiation of the entity that hides most of the sample's sky in interval j.
-  void add_exitance(std::size_t s, const glm::vec3& normal, std::size_t j,
+  /// Input of sample `s` in interval k of a window, without the fluxes of its partners.
+  [[nodiscard]] SampleDrive drive(std::size_t s, const glm::vec3& normal, const Window& window,
+                                  std::size_t k) const noexcept;
+  /// Adds the radiation of the entity that hides most of the sample's sky.
+  void add_exitance(std::size_t s, const glm::vec3& normal, const Window& window, std::size_t k,
                     SampleDrive& drive) const noexcept;
-  /// Integrates the samples of a group, and the other faces of sheets with them, over the record.
-  void carry(std::size_t group);
-  /// Input of sample `s` in interval j, with the fluxes of its partners.
+  /// Integrates the samples of a group, and the other faces of sheets with them, over a window.
+  void carry(std::size_t group, const Window& window);
+  /// Input of sample `s` in interval k of a window, with the fluxes of its partners.
   [[nodiscard]] SampleDrive whole_drive(std::size_t s, const glm::vec3& normal,
-                                        std::size_t j) const noexcept;
+                                        const Window& window, std::size_t k) const noexcept;
+  /// Row of a sample in the window at hand.
+  [[nodiscard]] float* row_of(std::size_t s, const Window& window) noexcept {
+    return &sent_[s * row_size(window.count)];
+  }
 
   const SurfaceInputs& in_;
   SurfaceModel& model_;
   SampleHistories histories_;
   std::size_t intervals_;
-  std::size_t nodes_;
-  std::vector<std::uint32_t> swept_;  ///< samples that sweeps change; one for both faces of a sheet
-  SentHistory second_;                ///< second rows of the samples that sweeps change
-  std::vector<SentRow> before_;       ///< by sample: what it sent in the latest sweep
-  std::vector<SentRow> after_;        ///< by sample: what it sends in this sweep
+  std::vector<std::uint32_t> swept_;     ///< samples that change; one for both faces of a sheet
+  std::vector<SentRow> rows_;            ///< by sample: what it sent in the latest pass
+  RowStore<float> flux_w_m2_;            ///< fluxes of this pass at every node: rows of partners
+  std::vector<std::uint32_t> flux_row_;  ///< by sample: its row there, or kNoList
+  std::vector<float> sent_;              ///< by sample: its row in the window at hand
+  std::vector<float> shift_w_m2_;        ///< by sample: long wave at the last node above its guess
+  std::vector<SampleState> begin_;       ///< by sample: state at the begin of the window
   SeenRadiation seen_;
   EntityExitance exitance_;
-  std::vector<EntityFaces> faces_;  ///< by node, then entity; empty without exchange or entities
+  std::size_t entities_ = 0;         ///< entities whose faces count; 0 without exchange
+  std::vector<EntityFaces> faces_;   ///< by node of the window, then entity
+  std::vector<EntityFaces> before_;  ///< faces of the iteration before
+  bool takes_courses_ = false;
   std::optional<BodyCourses> bodies_;
 };
 
@@ -120,57 +248,139 @@ Sweeper::Sweeper(const SurfaceInputs& inputs, const ExchangeOptions& options,
       model_(model),
       histories_(std::move(histories)),
       intervals_(inputs.record.size()),
-      nodes_(intervals_ + 1),
-      second_(SentRow::length(intervals_)),
-      seen_(model.samples, 2 * intervals_ + 1) {
-  for (const SampleHistories::Rows& rows : histories_.rows) before_.emplace_back(rows.sent_w_m2);
+      flux_w_m2_(intervals_ + 1),
+      flux_row_(model.samples.samples.size(), kNoList),
+      shift_w_m2_(model.samples.samples.size()),
+      seen_(model.samples) {
+  for (const SampleHistories::Rows& rows : histories_.rows) rows_.emplace_back(rows.sent_w_m2);
   if (options.exitance && !inputs.entities_now.empty()) {
     exitance_ = EntityExitance(model, inputs.geometry, inputs.entity_of_object);
-    faces_.resize(inputs.entities_now.size() * nodes_);
-    measure_faces();
+    entities_ = inputs.entities_now.size();
   }
-  // Find the samples that sweeps change. They need a second row; the others keep theirs.
-  after_ = before_;
-  const auto give_row = [&](std::uint32_t s) {
-    const std::size_t row = second_.rows();
-    second_.grow(row + 1);
-    after_[s] = SentRow(second_.row(row));
-  };
-  for (std::uint32_t s = 0; s < before_.size(); ++s) {
+  // Find the samples that change, and give those a row of fluxes that others may ask for theirs.
+  const std::vector<SurfaceSample>& all = model_.samples.samples;
+  for (std::uint32_t s = 0; s < all.size(); ++s) {
     if (!steps_itself(model_.samples, s)) continue;
-    const std::uint32_t other = model_.samples.samples[s].other_side;
+    const std::uint32_t other = all[s].other_side;
     if (alone(s) && (other == kNoSample || alone(other))) continue;
     swept_.push_back(s);
-    give_row(s);
-    if (other != kNoSample) give_row(other);
+    const auto is_partner = [](const Partner& partner) { return partner.sample != kNoSample; };
+    if (std::ranges::any_of(all[s].partners, is_partner)) {
+      flux_row_[s] = static_cast<std::uint32_t>(flux_w_m2_.rows());
+      flux_w_m2_.grow(flux_w_m2_.rows() + 1);
+    }
+    takes_courses_ = takes_courses_ || takes_course(s);
   }
   bodies_.emplace(model, inputs.geometry, inputs.heat, inputs.record, swept_, kAdvanceTogether);
   model.body_k = bodies_->end_k();
 }
 
-void Sweeper::measure_faces() {
-  const std::size_t entities = faces_.size() / nodes_;
-  threads::parallel_parts(faces_.empty() ? 0 : nodes_, 1, [&](std::size_t from, std::size_t to) {
-    for (std::size_t j = from; j < to; ++j) {
-      exitance_.measure(
-          model_.samples, in_.record.rays[std::min(j, intervals_ - 1)],
-          [&](std::size_t s) { return before_[s].longwave_w_m2(j); },
-          std::span(faces_).subspan(j * entities, entities));
+bool Sweeper::sweep(Pass pass, const SurfaceProgress& report) {
+  begin_ = histories_.start;
+  std::ranges::fill(shift_w_m2_, 0.0F);
+  for (Window window; window.first < intervals_; window.first += window.count) {
+    window.count = std::min(kWindow, intervals_ - window.first);
+    if (report && !report(static_cast<double>(window.first) / static_cast<double>(intervals_))) {
+      return false;
+    }
+    load(window);
+    seen_.begin(sent_, window.count);
+    faces_.resize(entities_ * (window.count + 1));
+    measure_faces(window);
+    carry_groups(window, [&](std::uint32_t s) { return pass != Pass::courses || takes_course(s); });
+    if (pass == Pass::settle) settle(window);
+    store(window);
+  }
+  take_courses();
+  return true;
+}
+
+void Sweeper::load(const Window& window) {
+  sent_.resize(rows_.size() * row_size(window.count));
+  threads::parallel_parts(rows_.size(), kGrain * kGrain, [&](std::size_t from, std::size_t to) {
+    for (std::size_t s = from; s < to; ++s) {
+      // Expect the long wave to stay as far above the guess as it was at the node before.
+      float* const row_w_m2 = row_of(s, window);
+      row_w_m2[0] = rows_[s].longwave_w_m2(window.first);
+      for (std::size_t k = 0; k < window.count; ++k) {
+        row_w_m2[1 + k] = rows_[s].longwave_w_m2(window.first + k + 1) + shift_w_m2_[s];
+        row_w_m2[window.count + 1 + k] = rows_[s].shortwave_w_m2(window.first + k);
+      }
     }
   });
 }
 
-void Sweeper::sweep() {
-  // Gather the radiation of the sweep before, then integrate every sample that it can change.
-  seen_.gather(before_);
-  threads::parallel_parts(bodies_->groups().size(), kGrain, [&](std::size_t from, std::size_t to) {
-    for (std::size_t group = from; group < to; ++group) carry(group);
+void Sweeper::settle(const Window& window) {
+  for (std::uint32_t i = 0; i < kMostIterations; ++i) {
+    const double faces_w_m2 = measure_faces(window);
+    const double seen_w_m2 = seen_.look(sent_);
+    const double left_w_m2 = std::max(faces_w_m2, seen_w_m2);
+    if (!(left_w_m2 > kExchangeResidual_w_m2)) return;
+    if (i + 1 == kMostIterations) {
+      model_.exchange_left_w_m2 = std::max(model_.exchange_left_w_m2, left_w_m2);
+      return;
+    }
+    seen_.take(i >= kPlainIterations);
+    const bool faces_changed = faces_w_m2 > kRenewFrac * kExchangeResidual_w_m2;
+    carry_groups(window, [&](std::uint32_t s) { return changed(s, window, faces_changed); });
+  }
+}
+
+void Sweeper::store(const Window& window) {
+  const std::size_t last = window.first + window.count;
+  threads::parallel_parts(swept_.size(), kGrain * kGrain, [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) {
+      const auto keep = [&](std::uint32_t s) {
+        const float* const row_w_m2 = row_of(s, window);
+        shift_w_m2_[s] = row_w_m2[window.count] - rows_[s].longwave_w_m2(last);
+        for (std::size_t k = 0; k <= window.count; ++k) {
+          rows_[s].keep_longwave(window.first + k, row_w_m2[k]);
+        }
+        for (std::size_t k = 0; k < window.count; ++k) {
+          rows_[s].keep_shortwave(window.first + k, row_w_m2[window.count + 1 + k]);
+        }
+      };
+      const std::uint32_t s = swept_[i];
+      keep(s);
+      const std::uint32_t other = model_.samples.samples[s].other_side;
+      if (other != kNoSample) keep(other);
+      begin_[s] = model_.states[s];
+    }
   });
+}
+
+void Sweeper::take_courses() {
+  for (const std::uint32_t s : swept_) {
+    if (flux_row_[s] == kNoList) continue;
+    const std::span<const float> flux_w_m2 = flux_w_m2_.row(flux_row_[s]);
+    for (std::size_t node = 0; node < flux_w_m2.size(); ++node) {
+      rows_[s].keep_flux(node, flux_w_m2[node]);
+    }
+  }
   bodies_->correct();
   model_.body_k = bodies_->end_k();
-  // Make the result of this sweep the input of the next one.
-  std::swap(before_, after_);
-  measure_faces();
+}
+
+double Sweeper::measure_faces(const Window& window) {
+  if (entities_ == 0) return 0.0;
+  before_ = faces_;
+  threads::parallel_parts(window.count + 1, 1, [&](std::size_t from, std::size_t to) {
+    for (std::size_t k = from; k < to; ++k) {
+      exitance_.measure(
+          model_.samples, in_.record.rays[std::min(window.first + k, intervals_ - 1)],
+          [&](std::size_t s) { return row_of(s, window)[k]; },
+          std::span(faces_).subspan(k * entities_, entities_));
+    }
+  });
+  double most_w_m2 = 0.0;
+  for (std::size_t i = 0; i < faces_.size(); ++i) {
+    for (std::size_t side = 0; side < faces_[i].sent_w.size(); ++side) {
+      if (!(faces_[i].area_m2[side] > 0.0F)) continue;
+      const float off_w = std::abs(faces_[i].sent_w[side] - before_[i].sent_w[side]);
+      most_w_m2 = std::max(most_w_m2, static_cast<double>(off_w / faces_[i].area_m2[side]));
+    }
+  }
+  return most_w_m2;
 }
 
 bool Sweeper::alone(std::size_t s) const noexcept {
@@ -179,12 +389,37 @@ bool Sweeper::alone(std::size_t s) const noexcept {
   for (const Partner& partner : sample.partners) {
     if (partner.sample != kNoSample) return false;
   }
-  if (faces_.empty()) return true;
+  if (entities_ == 0) return true;
   return std::ranges::all_of(histories_.rows[s].hidden_sky,
                              [](const HiddenSky& sky) { return sky.frac == 0.0F; });
 }
 
-SampleDrive Sweeper::drive(std::size_t s, const glm::vec3& normal, std::size_t j) const noexcept {
+bool Sweeper::changed(std::uint32_t s, const Window& window, bool faces_changed) const noexcept {
+  const SurfaceSample& sample = model_.samples.samples[s];
+  if (seen_.renewed(sample)) return true;
+  if (!faces_changed) return false;
+  return std::ranges::any_of(histories_.rows[s].hidden_sky.subspan(window.first, window.count),
+                             [](const HiddenSky& sky) { return sky.frac != 0.0F; });
+}
+
+template <class Chosen>
+void Sweeper::carry_groups(const Window& window, const Chosen& chosen) {
+  const std::span<const BodyCourses::Group> groups = bodies_->groups();
+  threads::parallel_parts(groups.size(), kGrain, [&](std::size_t from, std::size_t to) {
+    for (std::size_t group = from; group < to; ++group) {
+      const auto samples = std::span(swept_).subspan(groups[group].first, groups[group].count);
+      const bool needed = std::ranges::any_of(samples, [&](std::uint32_t s) {
+        const std::uint32_t other = model_.samples.samples[s].other_side;
+        return chosen(s) || (other != kNoSample && chosen(other));
+      });
+      if (needed) carry(group, window);
+    }
+  });
+}
+
+SampleDrive Sweeper::drive(std::size_t s, const glm::vec3& normal, const Window& window,
+                           std::size_t k) const noexcept {
+  const std::size_t j = window.first + k;
   const SurfaceSample& sample = model_.samples.samples[s];
   SampleDrive drive;
   const SampleHistories::Rows& rows = histories_.rows[s];
@@ -193,24 +428,23 @@ SampleDrive Sweeper::drive(std::size_t s, const glm::vec3& normal, std::size_t j
   if (sample.body >= 0) drive.body_k = bodies_->mean_k(sample.body, j);
   if (!rows.hidden_sky.empty()) drive.hidden_sky_frac = rows.hidden_sky[j].frac;
   // Add what the seen samples send, scaled to the share of the hemisphere that they fill.
-  if (const std::span<const double> received_w_m2 = seen_.of(sample); !received_w_m2.empty()) {
-    const double scale = sample.seen_scale;
-    drive.longwave_begin_w_m2 = scale * received_w_m2[j];
-    drive.longwave_end_w_m2 = scale * received_w_m2[j + 1];
-    drive.shortwave_w_m2 = scale * received_w_m2[nodes_ + j];
+  const SeenRadiation::Received received = seen_.of(sample);
+  if (!received.row_w_m2.empty()) {
+    drive.longwave_begin_w_m2 = received.scale * received.row_w_m2[k];
+    drive.longwave_end_w_m2 = received.scale * received.row_w_m2[k + 1];
+    drive.shortwave_w_m2 = received.scale * received.row_w_m2[window.count + 1 + k];
   }
-  add_exitance(s, normal, j, drive);
+  add_exitance(s, normal, window, k, drive);
   return drive;
 }
 
-void Sweeper::add_exitance(std::size_t s, const glm::vec3& normal, std::size_t j,
-                           SampleDrive& drive) const noexcept {
-  if (faces_.empty() || drive.hidden_sky_frac == 0.0F) return;
-  const std::size_t entity = histories_.rows[s].hidden_sky[j].entity;
-  const std::size_t entities = faces_.size() / nodes_;
+void Sweeper::add_exitance(std::size_t s, const glm::vec3& normal, const Window& window,
+                           std::size_t k, SampleDrive& drive) const noexcept {
+  if (entities_ == 0 || drive.hidden_sky_frac == 0.0F) return;
+  const std::size_t entity = histories_.rows[s].hidden_sky[window.first + k].entity;
   // Leave the surroundings in place if no face of the entity looks towards the surface.
-  const float begin_w_m2 = faces_[j * entities + entity].towards_w_m2(normal);
-  const float end_w_m2 = faces_[(j + 1) * entities + entity].towards_w_m2(normal);
+  const float begin_w_m2 = faces_[k * entities_ + entity].towards_w_m2(normal);
+  const float end_w_m2 = faces_[(k + 1) * entities_ + entity].towards_w_m2(normal);
   if (begin_w_m2 < 0.0F || end_w_m2 < 0.0F) return;
   const double hidden_frac = model_.samples.samples[s].sky_frac * drive.hidden_sky_frac;
   drive.longwave_begin_w_m2 += hidden_frac * begin_w_m2;
@@ -218,25 +452,37 @@ void Sweeper::add_exitance(std::size_t s, const glm::vec3& normal, std::size_t j
   drive.hidden_is_seen = true;
 }
 
-SampleDrive Sweeper::whole_drive(std::size_t s, const glm::vec3& normal,
-                                 std::size_t j) const noexcept {
-  SampleDrive drive = this->drive(s, normal, j);
+SampleDrive Sweeper::whole_drive(std::size_t s, const glm::vec3& normal, const Window& window,
+                                 std::size_t k) const noexcept {
+  SampleDrive drive = this->drive(s, normal, window, k);
   const SurfaceSample& sample = model_.samples.samples[s];
+  const std::size_t j = window.first + k;
   for (std::size_t p = 0; p < kMaxPartners; ++p) {
     const std::uint32_t partner = sample.partners[p].sample;
     if (partner == kNoSample) continue;
-    drive.partner_begin_w_m2[p] = before_[partner].flux_w_m2(j);
-    drive.partner_end_w_m2[p] = before_[partner].flux_w_m2(j + 1);
+    drive.partner_begin_w_m2[p] = rows_[partner].flux_w_m2(j);
+    drive.partner_end_w_m2[p] = rows_[partner].flux_w_m2(j + 1);
   }
   return drive;
 }
 
-void Sweeper::carry(std::size_t group) {
+void Sweeper::carry(std::size_t group, const Window& window) {
   const BodyCourses::Group& chosen = bodies_->groups()[group];
   const std::span<const std::uint32_t> samples =
       std::span(swept_).subspan(chosen.first, chosen.count);
+  if (chosen.body >= 0) bodies_->forget(group, window.first, window.count);
   const auto add_to_body = [&](std::size_t i, std::size_t node, const SampleState& state) {
     if (chosen.body >= 0) bodies_->add(group, node, samples[i], state);
+  };
+  // Keep what a sample sends at node k of the window, or over interval k and at its end.
+  const auto keep_node = [&](std::uint32_t s, std::size_t k, const SampleOutput& output) {
+    row_of(s, window)[k] = output.longwave_out_w_m2;
+    if (flux_row_[s] == kNoList) return;
+    flux_w_m2_.row(flux_row_[s])[window.first + k] = output.flux_w_m2;
+  };
+  const auto keep_end = [&](std::uint32_t s, std::size_t k, const SampleOutput& output) {
+    keep_node(s, k + 1, output);
+    row_of(s, window)[window.count + 1 + k] = output.shortwave_out_w_m2;
   };
   const std::vector<SurfaceSample>& all = model_.samples.samples;
   std::array<SampleAdvance, kAdvanceTogether> fronts;
@@ -247,14 +493,15 @@ void Sweeper::carry(std::size_t group) {
   std::array<SampleOutput, kAdvanceTogether> back_outputs;
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const SurfaceSample& sample = all[samples[i]];
-    states[i] = histories_.start[samples[i]];
+    states[i] = begin_[samples[i]];
     fronts[i].sample = &sample;
     fronts[i].state = &states[i];
     if (sample.other_side == kNoSample) continue;
     backs[i].emplace(SheetBack{all[sample.other_side], back_drives[i]});
     fronts[i].back = &*backs[i];
   }
-  for (std::size_t j = 0; j < intervals_; ++j) {
+  for (std::size_t k = 0; k < window.count; ++k) {
+    const std::size_t j = window.first + k;
     const HeatInterval& interval = in_.record.intervals[j];
     const SurfaceForcing& begin = interval.forcing.begin;
     // Collect the input of the samples over the interval.
@@ -262,36 +509,36 @@ void Sweeper::carry(std::size_t group) {
       const std::uint32_t s = samples[i];
       SampleAdvance& front = fronts[i];
       front.normal = in_.record.rays[j].normal(*front.sample);
-      front.drive = whole_drive(s, front.normal, j);
+      front.drive = whole_drive(s, front.normal, window, k);
       const bool first = j == 0;
       if (first) {
         add_to_body(i, 0, states[i]);
-        after_[s].keep_begin(
-            in_.heat.output(*front.sample, front.normal, begin, front.drive, states[i]));
+        keep_node(s, 0,
+                  in_.heat.output(*front.sample, front.normal, begin, front.drive, states[i]));
       }
       if (front.back == nullptr) continue;
       const std::uint32_t other = front.sample->other_side;
-      back_drives[i] = drive(other, -front.normal, j);
+      back_drives[i] = drive(other, -front.normal, window, k);
       if (first) {
-        after_[other].keep_begin(
-            in_.heat.output(all[other], -front.normal, begin, back_drives[i], states[i]));
+        keep_node(other, 0,
+                  in_.heat.output(all[other], -front.normal, begin, back_drives[i], states[i]));
       }
     }
     // Advance them, sheets together with their other faces.
     in_.heat.advance_all(std::span(fronts).first(samples.size()), interval);
     for (std::size_t i = 0; i < samples.size(); ++i) {
       const SampleAdvance& front = fronts[i];
-      after_[samples[i]].keep_end(j, front.output);
+      keep_end(samples[i], k, front.output);
       add_to_body(i, j + 1, states[i]);
       if (front.back == nullptr) continue;
       const std::uint32_t other = front.sample->other_side;
       back_drives[i].longwave_begin_w_m2 = back_drives[i].longwave_end_w_m2;
       back_outputs[i] = in_.heat.output(all[other], -front.normal, interval.forcing.end,
                                         back_drives[i], states[i]);
-      after_[other].keep_end(j, back_outputs[i]);
+      keep_end(other, k, back_outputs[i]);
     }
   }
-  // Store the end of the record; both faces of a sheet have one state.
+  // Store the end of the window; both faces of a sheet have one state.
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const std::uint32_t s = samples[i];
     model_.states[s] = states[i];
@@ -357,11 +604,15 @@ bool exchange(const SurfaceInputs& inputs, const ExchangeOptions& options,
               SampleHistories histories, SurfaceModel& model, const SurfaceProgress& report) {
   EMIT_CHECK_OP(histories.start.size(), ==, model.samples.samples.size());
   EMIT_CHECK_OP(histories.rows.size(), ==, model.samples.samples.size());
-  if (options.sweeps == 0) return !report || report(1.0);
   Sweeper sweeper(inputs, options, std::move(histories), model);
-  for (std::uint32_t i = 0; i < options.sweeps; ++i) {
-    if (report && !report((i + 1.0) / (options.sweeps + 1.0))) return false;
-    sweeper.sweep();
+  std::vector<Pass> passes{Pass::settle};
+  if (sweeper.takes_courses()) passes = {Pass::bounce, Pass::courses, Pass::settle};
+  for (std::size_t i = 0; i < passes.size(); ++i) {
+    const auto within = [&](double frac) {
+      return !report ||
+             report((static_cast<double>(i) + frac) / static_cast<double>(passes.size()));
+    };
+    if (!sweeper.sweep(passes[i], within)) return false;
   }
   return !report || report(1.0);
 }

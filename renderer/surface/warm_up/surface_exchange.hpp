@@ -7,7 +7,7 @@
 
 namespace emit::renderer {
 
-/// Data of the sweeps of exchange(). The rows stay where the patches have put them: with a million
+/// Data of the passes of exchange(). The rows stay where the patches have put them: with a million
 /// samples they take gigabytes.
 struct SampleHistories {
   /// Rows of one sample.
@@ -31,22 +31,25 @@ struct SampleHistories {
                                              std::vector<SurfacePatch> patches,
                                              SurfaceModel& model);
 
-/// Number of sweeps of exchange() after a first guess that takes the surroundings for everything
-/// seen. Each sweep follows heat over one more bounce, of which a third at most is reflected or
-/// emitted again within minutes.
-inline constexpr std::uint32_t kExchangeSweeps = 3;
-
+/// Residual of the exchange: radiation that arrives at a sample and that the iteration has not
+/// followed yet, W/m2. What is left of a temperature is below it divided by the radiative
+/// conductance (6 W m-2 K-1 at 300 K) and by the share of the radiation that a round trip loses.
+inline constexpr double kExchangeResidual_w_m2 = 0.02;
+/// Largest number of iterations in a window. Where they do not suffice, the residual that is left
+/// stands in SurfaceModel::exchange_left_w_m2.
+inline constexpr std::uint32_t kMostIterations = 200;
 /// Options of exchange().
 struct ExchangeOptions {
-  std::uint32_t sweeps = kExchangeSweeps;
   bool exitance = true;  ///< entities send long-wave radiation to the surfaces whose sky they hide
 };
 
-/// Integrates all samples over the record several times, each time with the radiation and the heat
-/// that the others sent in the time before. These are Jacobi sweeps over whole histories, so the
-/// result does not depend on the order of samples (physics.md eq. 20, 22). Fills states and outputs
-/// of the model; samples that exchange nothing are left as they are. Uses all cores. Returns false
-/// when `report` stopped it.
+/// Integrates all samples over the record, with the radiation that the others send meanwhile. The
+/// record is cut into windows of a few intervals; within each, the radiation is iterated until its
+/// residual is below kExchangeResidual_w_m2 (physics.md eq. 20), with mixed steps where plain ones
+/// are slow. The result does not depend on the order of samples. Fluxes of partners (eq. 22) and
+/// interiors of bodies take several passes over the record, of which the last one iterates. Fills
+/// states and outputs of the model; samples that exchange nothing are left as they are. Uses all
+/// cores. Returns false when `report` stopped it.
 [[nodiscard]] bool exchange(const SurfaceInputs& inputs, const ExchangeOptions& options,
                             SampleHistories histories, SurfaceModel& model,
                             const SurfaceProgress& report);

@@ -153,6 +153,8 @@ struct SceneStats {
   std::uint64_t samples = 0;
   std::uint64_t sample_bytes = 0;
   bool samples_full = false;
+  /// Radiation between surfaces that the warm-up could not settle, W/m2; 0 if it did.
+  double exchange_left_w_m2 = 0.0;
   std::uint64_t max_samples = 0;  ///< thermal.max_samples; fewer than the meshes need do not bind
   /// Meshes lost visible detail because thermal.max_samples is too small.
   bool coarse_meshes = false;
@@ -163,7 +165,8 @@ struct SceneStats {
 };
 
 /// Returns warnings that are known after warm_up(), one sentence each: gaps of the first frame's
-/// history and weather, and a `thermal.max_samples` that is too small.
+/// history and weather, a `thermal.max_samples` that is too small, and radiation between surfaces
+/// that did not settle.
 [[nodiscard]] std::vector<std::string> warm_up_warnings(const SceneStats& stats);
 
 /// Number of a read-back slot.
