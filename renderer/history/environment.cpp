@@ -12,7 +12,8 @@ bool same_weather(const physics::WeatherSample& a, const physics::WeatherSample&
          a.diffuse_horizontal_w_m2 == b.diffuse_horizontal_w_m2 &&
          a.longwave_down_w_m2 == b.longwave_down_w_m2 && a.air_k == b.air_k &&
          a.wind_m_s == b.wind_m_s && a.cloud_frac == b.cloud_frac &&
-         a.environment_k == b.environment_k && a.film_w_m2_k == b.film_w_m2_k;
+         a.environment_k == b.environment_k && a.film_w_m2_k == b.film_w_m2_k &&
+         a.wind_from_rad == b.wind_from_rad;
 }
 
 }  // namespace
@@ -79,9 +80,14 @@ physics::Forcing Environment::forcing_at(std::int64_t sim_time_ns,
   const auto after = std::upper_bound(
       live_.begin(), live_.end(), sim_time_ns,
       [](std::int64_t t, const physics::WeatherSample& row) { return t < row.sim_time_ns; });
-  if (after != live_.begin()) return physics::forcing_from_rows({&*(after - 1), 1}, sim_time_ns);
-  if (!table_.empty()) return physics::forcing_from_rows(table_, sim_time_ns);
-  return physics::forcing_from_clear_sky(clear_sky_, place_, sun, epoch_utc_ns_ + sim_time_ns);
+  if (after == live_.begin() && table_.empty()) {
+    return physics::forcing_from_clear_sky(clear_sky_, place_, sun, epoch_utc_ns_ + sim_time_ns);
+  }
+  physics::Forcing forcing = after != live_.begin()
+                                 ? physics::forcing_from_rows({&*(after - 1), 1}, sim_time_ns)
+                                 : physics::forcing_from_rows(table_, sim_time_ns);
+  forcing.height_m = place_.height.value();
+  return forcing;
 }
 
 }  // namespace emit::renderer

@@ -90,8 +90,10 @@ void fit_changes(HistoryInterval& interval, const Environment& environment) noex
   for (double physics::Forcing::*value :
        {&physics::Forcing::direct_normal_w_m2, &physics::Forcing::diffuse_horizontal_w_m2,
         &physics::Forcing::longwave_down_w_m2, &physics::Forcing::air_k,
-        &physics::Forcing::environment_k, &physics::Forcing::film_w_m2_k,
-        &physics::Forcing::wind_m_s, &physics::Forcing::cloud_frac}) {
+        &physics::Forcing::environment_k, &physics::Forcing::stated_film_w_m2_k,
+        &physics::Forcing::stated_film_frac, &physics::Forcing::wind_m_s,
+        &physics::Forcing::wind_to_east, &physics::Forcing::wind_to_north,
+        &physics::Forcing::cloud_frac}) {
     double mean = 0.0;
     double moment = 0.0;
     double low = parts[0].*value;
@@ -135,20 +137,23 @@ SurfaceForcing open_forcing(const physics::SunPosition& sun,
   out.sun_w_m2 = direct_w_m2 * sun.direction_enu;
   out.diffuse_w_m2 = weather.diffuse_horizontal_w_m2;
   out.longwave_w_m2 = weather.longwave_down_w_m2;
-  out.film_w_m2_k = weather.film_w_m2_k;
+  out.flow = physics::air_flow(weather);
+  out.film = physics::air_film(out.flow);
   out.air_k = weather.air_k;
   return out;
 }
 
 FosterDrive<double> unshadowed_drive(const SurfaceForcing& f, const FosterMaterial& material,
-                                     const glm::dvec3& normal, double reference_k) noexcept {
+                                     const glm::dvec3& normal, double reference_k,
+                                     double offset_k) noexcept {
   const double sky_frac = 0.5 * (1.0 + normal.z);
   const double short_wave_w_m2 = std::max(0.0, glm::dot(normal, f.sun_w_m2)) +
                                  sky_frac * f.diffuse_w_m2 + (1.0 - sky_frac) * f.reflected_w_m2;
   const double long_wave_w_m2 = sky_frac * f.longwave_w_m2 + (1.0 - sky_frac) * f.environment_w_m2;
   return {.absorbed_w_m2 = material.solar_absorptance_frac * short_wave_w_m2 +
                            material.emissivity_frac * long_wave_w_m2,
-          .film_w_m2_k = f.film_w_m2_k,
+          .film_w_m2_k = physics::film_w_m2_k(f.film, normal, material.roughness,
+                                              reference_k + offset_k - f.air_k),
           .air_offset_k = f.air_k - reference_k};
 }
 
@@ -159,6 +164,7 @@ physics::Result<std::vector<FosterMaterial>> foster_materials(
     FosterMaterial entry;
     entry.solar_absorptance_frac = material.solar_absorptance_frac;
     entry.emissivity_frac = material.emissivity_frac;
+    entry.roughness = scene::roughness_factor(material.roughness);
     entry.base_k = material.base_k;
     entry.initial_k = material.initial_k.value_or(options.initial_k);
     if (material.prescribed_k) {
@@ -250,12 +256,13 @@ void FosterHistory::carry(const HistoryInterval& interval, double tolerance_k,
   double begin_k = surroundings_.prescribed_k;
   double end_k = surroundings_.prescribed_k;
   if (!surroundings_.prescribed()) {
-    begin_k = reference_k_ + physics::foster_offset_k(surroundings_state_, surroundings_surface_);
+    const double offset_k = physics::foster_offset_k(surroundings_state_, surroundings_surface_);
+    begin_k = reference_k_ + offset_k;
     const auto ladder = physics::foster_ladder(out.dt_s, surroundings_.network);
     physics::foster_advance(surroundings_state_,
-                            unshadowed_drive(out.begin, surroundings_, up, reference_k_),
-                            unshadowed_drive(out.end, surroundings_, up, reference_k_), ladder,
-                            surroundings_surface_, tolerance_k);
+                            unshadowed_drive(out.begin, surroundings_, up, reference_k_, offset_k),
+                            unshadowed_drive(out.end, surroundings_, up, reference_k_, offset_k),
+                            ladder, surroundings_surface_, tolerance_k);
     end_k = reference_k_ + physics::foster_offset_k(surroundings_state_, surroundings_surface_);
   }
   const auto exitance_w_m2 = [](double t_k) {
@@ -335,16 +342,14 @@ FosterState<double> FosterHistory::spun_up(std::size_t index,
   FosterState<double> x = initial_states(material);
   if (spin_up_.empty()) return x;
   const auto surface = surface_of(material, reference_k_);
-  FosterDrive<double> from =
-      unshadowed_drive(spin_up_.front().begin, material, normal, reference_k_);
   for (std::size_t i = 0; i < spin_up_.size(); ++i) {
-    const FosterDrive<double> to =
-        unshadowed_drive(spin_up_[i].end, material, normal, reference_k_);
-    physics::foster_step(x, from, to, spin_up_gains_[index][i], surface);
-    // A jump of the weather at a node acts from that node on.
-    from = i + 1 < spin_up_.size()
-               ? unshadowed_drive(spin_up_[i + 1].begin, material, normal, reference_k_)
-               : to;
+    // The film follows the temperature at the start of the step.
+    const double offset_k = physics::foster_offset_k(x, surface);
+    const auto drive = [&](const SurfaceForcing& f) {
+      return unshadowed_drive(f, material, normal, reference_k_, offset_k);
+    };
+    physics::foster_step(x, drive(spin_up_[i].begin), drive(spin_up_[i].end),
+                         spin_up_gains_[index][i], surface);
   }
   return x;
 }

@@ -27,11 +27,13 @@ namespace emit::renderer {
 [[nodiscard]] HistoryInterval interval_between(std::int64_t begin_ns, std::int64_t end_ns,
                                                const Environment& environment) noexcept;
 
-/// Returns the drive of an unshadowed face with that normal. RT-safe.
+/// Returns the drive of an unshadowed face with that normal. `offset_k` is its temperature from the
+/// reference, which sets the film. RT-safe.
 [[nodiscard]] physics::FosterDrive<double> unshadowed_drive(const SurfaceForcing& forcing,
                                                             const FosterMaterial& material,
                                                             const glm::dvec3& normal,
-                                                            double reference_k) noexcept;
+                                                            double reference_k,
+                                                            double offset_k) noexcept;
 
 /// History of the surroundings' temperature, and table of the states in which unshadowed surfaces
 /// begin the history. Owner: Renderer.

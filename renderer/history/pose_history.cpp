@@ -56,8 +56,9 @@ double path_in(const scene::Trajectory& keys, std::int64_t begin_ns, std::int64_
 
 }  // namespace
 
-PoseHistory::PoseHistory(const scene::ObjectDesc& object, const physics::Pose& placement)
-    : scripted_(object.trajectory) {
+PoseHistory::PoseHistory(const scene::ObjectDesc& object, const physics::Pose& placement,
+                         const physics::AirFilmBody& film_body)
+    : film_body_(film_body), scripted_(object.trajectory) {
   live_.reserve(kMaxLivePoses);
   events_ns_.reserve(kMaxEvents);
   if (scripted_.empty()) {
@@ -231,6 +232,22 @@ bool PoseHistory::departs(const Known& then, std::int64_t sim_time_ns) const noe
   const TrajectoryState now = at(sim_time_ns);
   const TrajectoryState before = as_known(then, sim_time_ns);
   return now.on != before.on || (now.on && !close(now.pose, before.pose));
+}
+
+PoseHistory::Motion PoseHistory::motion(std::int64_t begin_ns, std::int64_t end_ns) const noexcept {
+  constexpr std::int64_t kLatestNs = 1'000'000'000;
+  if (!live_.empty() && live_.back().sim_time_ns < end_ns) {
+    end_ns = live_.back().sim_time_ns;
+    begin_ns = std::min(begin_ns, end_ns - kLatestNs);
+  }
+  const double way_m = path_m(begin_ns, end_ns);
+  if (end_ns <= begin_ns || !(way_m > 0.0)) return {};
+  const double dt_s = static_cast<double>(end_ns - begin_ns) * 1e-9;
+  const glm::dvec3 shift_m = at(end_ns).pose.position_world_m - at(begin_ns).pose.position_world_m;
+  const double straight_m = glm::length(shift_m);
+  // A shift beyond the way holds a jump, so that its direction says nothing.
+  if (straight_m > 1.001 * way_m) return {glm::dvec3(0.0), way_m / dt_s};
+  return {shift_m / dt_s, std::sqrt(std::max(0.0, way_m * way_m - straight_m * straight_m)) / dt_s};
 }
 
 double PoseHistory::path_m(std::int64_t begin_ns, std::int64_t end_ns) const noexcept {

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "emit/physics/air_film.hpp"
 #include "emit/physics/check.hpp"
 #include "emit/physics/frames.hpp"
 #include "emit/scene/scene_desc.hpp"
@@ -29,7 +30,9 @@ class PoseHistory {
 
   /// Starts with the scenario's trajectory of the object. An entity without trajectory stands at
   /// `placement`.
-  PoseHistory(const scene::ObjectDesc& object, const physics::Pose& placement);
+  /// `film_body` is the shape that sets its film.
+  PoseHistory(const scene::ObjectDesc& object, const physics::Pose& placement,
+              const physics::AirFilmBody& film_body = {});
 
   /// Adds a live pose. Poses that lie on the way between their neighbours are thinned out (to 1 cm
   /// and 1 mrad, at most one second apart while moving). Returns false, and ignores the pose, when
@@ -66,6 +69,18 @@ class PoseHistory {
   /// do not count.
   [[nodiscard]] double path_m(std::int64_t begin_ns, std::int64_t end_ns) const noexcept;
 
+  /// Motion of an entity over an interval: its mean velocity in world axes, and the speed on ways
+  /// that lead nowhere, which adds in squares.
+  struct Motion {
+    glm::dvec3 velocity_m_s{0.0};
+    double undirected_m_s = 0.0;
+  };
+  /// Returns the motion between two instants. If they lie after the newest pose that the host sent,
+  /// the motion of the last second before that pose goes on. Jumps do not count.
+  [[nodiscard]] Motion motion(std::int64_t begin_ns, std::int64_t end_ns) const noexcept;
+  /// Returns shape and length of the flow past the entity.
+  [[nodiscard]] const physics::AirFilmBody& film_body() const noexcept { return film_body_; }
+
   /// Returns the instants at which the entity appears, vanishes, starts or stops, ascending: the
   /// latest kMaxEvents.
   [[nodiscard]] std::span<const std::int64_t> events_ns() const noexcept { return events_ns_; }
@@ -84,6 +99,7 @@ class PoseHistory {
   void note_motion(const scene::Keyframe& last, const scene::Keyframe& next) noexcept;
   void note_scripted_events() noexcept;
 
+  physics::AirFilmBody film_body_;
   scene::Trajectory scripted_;
   scene::Trajectory live_;
   std::vector<std::int64_t> events_ns_;

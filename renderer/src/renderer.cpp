@@ -19,6 +19,7 @@
 #include "emit/scene/mesh.hpp"
 #include "emit/scene/sheets.hpp"
 #include "gl/egl_context.hpp"
+#include "history/entity_air.hpp"
 #include "history/first_frame_warnings.hpp"
 #include "history/foster_setup.hpp"
 #include "history/pose_history.hpp"
@@ -271,10 +272,12 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
         scenario.file.string()));
   }
   // Give each entity a history of poses.
-  for (const scene::ObjectDesc& object : scenario_.objects) {
+  for (std::size_t i = 0; i < scenario_.objects.size(); ++i) {
+    const scene::ObjectDesc& object = scenario_.objects[i];
     if (object.entity_id == 0) continue;
     entity_ids_.push_back(object.entity_id);
-    history_.entities.emplace_back(object, object.instances.front());
+    history_.entities.emplace_back(object, object.instances.front(),
+                                   entity_film_body(scenario_, geometry, i));
   }
   history_.parts = make_part_histories(scenario_, geometry, scene_stats_.warnings);
   const std::size_t plane_px = std::size_t{scenario_.sensor.width_px} * scenario_.sensor.height_px;

@@ -200,6 +200,7 @@ std::vector<gpu::MaterialParams> material_params(std::span<const scene::Material
     gpu::MaterialParams params{};
     params.solar_absorptance_frac = static_cast<float>(material.solar_absorptance_frac);
     params.emissivity_frac = static_cast<float>(material.emissivity_frac);
+    params.roughness = static_cast<float>(scene::roughness_factor(material.roughness));
     if (material.core_conductance_w_m2_k) {
       params.conductance_w_m2_k = static_cast<float>(*material.core_conductance_w_m2_k);
     } else if (!material.layers.empty()) {

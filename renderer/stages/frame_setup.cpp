@@ -77,6 +77,24 @@ void set_fluxes(const Fluxes& start, const Fluxes& end, gpu::StepParams& params)
   params.environment_end_w_m2 = end.environment;
 }
 
+/// Returns a film in float32.
+gpu::FilmParams film_params(const physics::AirFilm& film) noexcept {
+  gpu::FilmParams params{};
+  params.upwind = vec3_from(film.upwind);
+  params.directed_frac = static_cast<float>(film.directed_frac);
+  params.windward_w_m2_k = static_cast<float>(film.windward_w_m2_k);
+  params.leeward_w_m2_k = static_cast<float>(film.leeward_w_m2_k);
+  params.vertical_root = static_cast<float>(film.vertical_root);
+  params.vertical_rise = static_cast<float>(film.vertical_rise);
+  params.unstable_quarter = static_cast<float>(film.unstable_quarter);
+  params.unstable_third = static_cast<float>(film.unstable_third);
+  params.stable_quarter = static_cast<float>(film.stable_quarter);
+  params.rough_frac = static_cast<float>(film.rough_frac);
+  params.stated_w_m2_k = static_cast<float>(film.stated_w_m2_k);
+  params.model_frac = static_cast<float>(film.model_frac);
+  return params;
+}
+
 }  // namespace
 
 LightFrusta set_step(const HistoryInterval& interval, const CameraSetup& camera,
@@ -184,9 +202,9 @@ void set_foster_forcing(const IntervalForcing& forcing, double reference_k,
   set_sun(forcing.end, params.to_sun_end, params.sun_end_w_m2);
   // Write fluxes, film and air at both ends.
   set_fluxes(fluxes(forcing.begin), fluxes(forcing.end), params);
-  params.film_start_w_m2_k = static_cast<float>(forcing.begin.film_w_m2_k);
+  params.film_start = film_params(forcing.begin.film);
+  params.film_end = film_params(forcing.end.film);
   params.air_start_offset_k = static_cast<float>(forcing.begin.air_k - reference_k);
-  params.film_end_w_m2_k = static_cast<float>(forcing.end.film_w_m2_k);
   params.air_end_offset_k = static_cast<float>(forcing.end.air_k - reference_k);
 }
 

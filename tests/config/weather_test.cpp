@@ -96,7 +96,8 @@ TEST_F(Weather, what_a_table_lacks_before_its_first_row_the_clear_sky_models_mak
                                 .air_amplitude_k = 4.0,
                                 .dew_point_k = 260.0,
                                 .wind_m_s = 5.0,
-                                .cloud_frac = 0.25};
+                                .cloud_frac = 0.25,
+                                .wind_from_rad = std::nullopt};
   const auto loaded = load(clear_day(0, 24, model));
   ASSERT_GT(loaded.weather.size(), 200U);
   EXPECT_EQ(loaded.weather.front().sim_time_ns, -48 * kHourNs);

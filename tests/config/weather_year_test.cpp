@@ -357,6 +357,12 @@ TEST_P(WeatherDriver, EveryHourKeepsWhatTheFileSays) {
     ASSERT_NEAR(rows[4].air_k, *record.air_k, 1e-9) << record.line;
     ASSERT_NEAR(rows[4].longwave_down_w_m2, *record.longwave_down_w_m2, 1e-9) << record.line;
     ASSERT_NEAR(rows[4].wind_m_s, *record.wind_m_s, 1e-9) << record.line;
+    ASSERT_EQ(rows[4].wind_from_rad.has_value(), record.wind_from_deg.has_value()) << record.line;
+    if (record.wind_from_deg) {
+      const double turn_rad =
+          *rows[4].wind_from_rad - *record.wind_from_deg * std::numbers::pi / 180.0;
+      ASSERT_NEAR(std::remainder(turn_rad, 2.0 * std::numbers::pi), 0.0, 1e-9) << record.line;
+    }
   }
   // A few hours of sunrise and sunset have more sun than their height allows.
   EXPECT_LT(beam_off, 0.002 * beam_sum);

@@ -149,10 +149,11 @@ class OpenGround {
     return s;
   }
   void advance(const renderer::IntervalForcing& interval) {
-    physics::foster_advance(x_, unshadowed_drive(interval.begin, material_, kUp, kReferenceK),
-                            unshadowed_drive(interval.end, material_, kUp, kReferenceK),
-                            physics::foster_ladder(interval.dt_s, material_.network), surface_,
-                            1e-3);
+    const double offset_k = physics::foster_offset_k(x_, surface_);
+    physics::foster_advance(
+        x_, unshadowed_drive(interval.begin, material_, kUp, kReferenceK, offset_k),
+        unshadowed_drive(interval.end, material_, kUp, kReferenceK, offset_k),
+        physics::foster_ladder(interval.dt_s, material_.network), surface_, 1e-3);
   }
 
   scene::ScenarioDesc scenario_;

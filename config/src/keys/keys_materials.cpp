@@ -11,6 +11,7 @@ using scene::FosterMode;
 using scene::Layer;
 using scene::Material;
 using scene::RelaxationMode;
+using scene::Roughness;
 
 const KeyTable<Layer>& layer_keys() {
   static const KeyTable<Layer> keys = {
@@ -212,6 +213,18 @@ const KeyTable<Material>& material_keys() {
                                 "Total hemispherical emissivity in the long-wave infrared.")),
       band_emissivity_key(),
       layers_key(),
+      choice<Material>("roughness",
+                       std::vector<std::pair<std::string, Roughness>>{
+                           {"very_rough", Roughness::very_rough},
+                           {"rough", Roughness::rough},
+                           {"medium_rough", Roughness::medium_rough},
+                           {"medium_smooth", Roughness::medium_smooth},
+                           {"smooth", Roughness::smooth},
+                           {"very_smooth", Roughness::very_smooth}},
+                       EMIT_FIELD(roughness),
+                       "foster: roughness for the wind: gravel and crops are very_rough, brick "
+                       "rough, concrete medium_rough, fabric medium_smooth, painted metal smooth, "
+                       "glass very_smooth."),
       written_if([](const Material& in) { return !in.layers.empty(); },
                  choice<Material>(
                      "base",

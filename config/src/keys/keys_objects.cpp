@@ -263,6 +263,18 @@ const KeyTable<ObjectDraft>& object_keys() {
             "scale and rotation."),
         boolean<ObjectDraft>("on", EMIT_FIELD(desc.on),
                              "Entities: present until host or trajectory says otherwise."),
+        choice<ObjectDraft>("air_film",
+                            std::vector<std::pair<std::string, physics::AirFilmShape>>{
+                                {"surface", physics::AirFilmShape::surface},
+                                {"plate", physics::AirFilmShape::plate},
+                                {"cylinder", physics::AirFilmShape::cylinder}},
+                            EMIT_FIELD(desc.air_film.shape),
+                            "Entities: flow of the film. surface: in the wind, a plate above Mach "
+                            "0.3; plate: along "
+                            "the flow; cylinder: across it."),
+        number<ObjectDraft>("air_film_m", "m", between(0, 1000), EMIT_FIELD(desc.air_film.length_m),
+                            "Entities: length of that flow, the diameter of a cylinder. 0: the "
+                            "longest side of the geometry."),
         number<ObjectDraft>("interior_heat_j_m2_k", "J m-2 K-1", between(100, 1e7),
                             EMIT_FIELD(desc.interior.heat_j_m2_k),
                             "Heat capacity of the interior behind faces whose material rests on "

@@ -102,6 +102,10 @@ const KeyTable<WeatherSample>& weather_sample_keys() {
       number<WeatherSample>("wind_m_s", "m s-1", between(limits::kWindMS), EMIT_FIELD(wind_m_s),
                             "Wind speed. Without it the wind is that of `film_w_m2_k`, which is "
                             "needed then."),
+      number<WeatherSample>("wind_from_deg", "deg", between(0, 360), EMIT_FIELD(wind_from_rad),
+                            "Direction from which the wind blows, clockwise from north. Without it "
+                            "faces take the mean over all directions.",
+                            kDegree),
       number<WeatherSample>("cloud_frac", "", between(limits::kCloudFrac), EMIT_FIELD(cloud_frac),
                             "Share of the direct sun that clouds take (beta of physics.md eq. 1). "
                             "It is 0 where `dni_w_m2` is measured."),
@@ -109,10 +113,11 @@ const KeyTable<WeatherSample>& weather_sample_keys() {
                             EMIT_FIELD(environment_k),
                             "Temperature of the surroundings. Without it emit2014 takes the air's, "
                             "and foster computes it (`thermal.surroundings_material`)."),
-      number<WeatherSample>("film_w_m2_k", "W m-2 K-1", between(limits::kFilmWM2K),
-                            EMIT_FIELD(film_w_m2_k),
-                            "Convection coefficient. Without it a model of the wind gives it. "
-                            "emit2014 does not use it."),
+      number<WeatherSample>(
+          "film_w_m2_k", "W m-2 K-1", between(limits::kFilmWM2K), EMIT_FIELD(film_w_m2_k),
+          "Convection coefficient of all faces. Without it the air film of physics.md "
+          "section 8 gives one for each. "
+          "emit2014 does not use it."),
   };
   return keys;
 }
@@ -140,6 +145,11 @@ const KeyTable<WeatherDraft>& weather_keys() {
           "that of 60 % relative humidity.")),
       number<WeatherDraft>("wind_m_s", "m s-1", between(limits::kWindMS),
                            EMIT_FIELD(clear_sky.wind_m_s), "Clear-sky models: wind speed."),
+      number<WeatherDraft>("wind_from_deg", "deg", between(0, 360),
+                           EMIT_FIELD(clear_sky.wind_from_rad),
+                           "Clear-sky models: direction from which the wind blows, clockwise from "
+                           "north. Without it faces take the mean over all directions.",
+                           kDegree),
       number<WeatherDraft>("cloud_frac", "", between(limits::kCloudFrac),
                            EMIT_FIELD(clear_sky.cloud_frac),
                            "Clear-sky models: share of the direct sun that clouds take."),

@@ -66,6 +66,7 @@ class ModelSky {
     out.air_k = f.air_k;
     out.wind_m_s = f.wind_m_s;
     out.cloud_frac = f.cloud_frac;
+    out.wind_from_rad = model.wind_from_rad;
     return out;
   }
   /// The cosine of the daily course of the air temperature.
@@ -163,7 +164,8 @@ bool same_weather(const WeatherSample& a, const WeatherSample& b) {
          a.diffuse_horizontal_w_m2 == b.diffuse_horizontal_w_m2 &&
          a.longwave_down_w_m2 == b.longwave_down_w_m2 && a.air_k == b.air_k &&
          a.wind_m_s == b.wind_m_s && a.cloud_frac == b.cloud_frac &&
-         a.environment_k == b.environment_k && a.film_w_m2_k == b.film_w_m2_k;
+         a.environment_k == b.environment_k && a.film_w_m2_k == b.film_w_m2_k &&
+         a.wind_from_rad == b.wind_from_rad;
 }
 
 /// Median of the pauses between rows. @pre two rows or more

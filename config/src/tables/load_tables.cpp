@@ -48,7 +48,8 @@ Result<std::vector<scene::WeatherSample>> load_weather_csv(const std::filesystem
                               {"wind_m_s", false, between(limits::kWindMS)},
                               {"cloud_frac", false, between(limits::kCloudFrac)},
                               {"environment_k", false, between(limits::kEnvironmentK)},
-                              {"film_w_m2_k", false, between(limits::kFilmWM2K)}});
+                              {"film_w_m2_k", false, between(limits::kFilmWM2K)},
+                              {"wind_from_deg", false, between(0, 360)}});
   if (!rows) {
     return tl::unexpected<physics::Error>(rows.error());
   }
@@ -63,6 +64,7 @@ Result<std::vector<scene::WeatherSample>> load_weather_csv(const std::filesystem
     sample.cloud_frac = row.numbers[6].value_or(0.0);
     sample.environment_k = row.numbers[7];
     sample.film_w_m2_k = row.numbers[8];
+    if (row.numbers[9]) sample.wind_from_rad = *row.numbers[9] * physics::kDegree;
     if (!row.numbers[5] && !sample.film_w_m2_k) {
       return make_error(
           ErrorCode::config,

@@ -41,6 +41,7 @@ using physics::kZeroCelsiusK;
 const Field kAir{"dry bulb", &YearRecord::air_k, 1.0, kZeroCelsiusK, 99.9, physics::limits::kAirK};
 const Field kDew{"dew point", &YearRecord::dew_point_k, 1.0, kZeroCelsiusK, 99.9, {150.0, 340.0}};
 const Field kWind{"wind speed", &YearRecord::wind_m_s, 1.0, 0.0, 999.0, physics::limits::kWindMS};
+const Field kDirection{"wind direction", &YearRecord::wind_from_deg, 1.0, 0.0, 999.0, {0.0, 360.0}};
 const Field kCover{"opaque sky cover",         &YearRecord::cloud_frac, 0.1, 0.0, 99.0,
                    physics::limits::kCloudFrac};
 const Field kLongwave{"horizontal infrared",
@@ -220,8 +221,8 @@ Result<void> read_epw_head(Lines& lines, WeatherYear& year) {
 
 Result<WeatherYear> read_epw(Lines lines) {
   static const std::pair<std::size_t, const Field*> kColumns[] = {
-      {6, &kAir},      {7, &kDew},   {12, &kLongwave}, {14, &kBeam},
-      {15, &kDiffuse}, {21, &kWind}, {23, &kCover}};
+      {6, &kAir},      {7, &kDew},        {12, &kLongwave}, {14, &kBeam},
+      {15, &kDiffuse}, {20, &kDirection}, {21, &kWind},     {23, &kCover}};
   WeatherYear year;
   if (auto head = read_epw_head(lines, year); !head) return tl::unexpected<Error>(head.error());
   while (lines.next()) {
@@ -281,6 +282,11 @@ Result<WeatherYear> read_tmy3(Lines lines) {
   lines.next();
   const auto header = lines.cells();
   std::vector<std::pair<std::size_t, const Field*>> columns;
+  // Faces can do without the direction of the wind.
+  const auto direction = std::find(header.begin(), header.end(), "Wdir (degrees)");
+  if (direction != header.end()) {
+    columns.emplace_back(static_cast<std::size_t>(direction - header.begin()), &kDirection);
+  }
   for (const auto& [name, field] : kColumns) {
     const auto found = std::find(header.begin(), header.end(), name);
     if (found == header.end()) {

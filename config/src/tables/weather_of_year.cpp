@@ -198,6 +198,17 @@ std::vector<double> spread(std::span<const std::optional<double>> averages,
   return rows;
 }
 
+/// Returns the direction of the wind between two records, on the shorter way around. A record
+/// without direction takes that of the other one.
+std::optional<double> wind_between(const YearRecord& from, const YearRecord& to, double share) {
+  if (!from.wind_from_deg && !to.wind_from_deg) return std::nullopt;
+  const double begin_deg = from.wind_from_deg.value_or(to.wind_from_deg.value_or(0.0));
+  const double end_deg = to.wind_from_deg.value_or(begin_deg);
+  const double turn_deg = std::remainder(end_deg - begin_deg, 360.0);
+  const double deg = std::fmod(begin_deg + share * turn_deg + 360.0, 360.0);
+  return deg * physics::kDegree;
+}
+
 /// Rows of a run of records that follow each other.
 void append_rows(const WeatherYear& year, std::span<const Interval> run,
                  const scene::ScenarioDesc& scenario, Filled& filled,
@@ -245,6 +256,7 @@ void append_rows(const WeatherYear& year, std::span<const Interval> run,
     sample.longwave_down_w_m2 = mix(&YearRecord::longwave_down_w_m2);
     sample.air_k = mix(&YearRecord::air_k);
     sample.wind_m_s = mix(&YearRecord::wind_m_s);
+    sample.wind_from_rad = wind_between(from, to, share);
     out.push_back(sample);
   }
 }

@@ -25,6 +25,7 @@ struct YearRecord {
   std::optional<double> air_k;
   std::optional<double> dew_point_k;
   std::optional<double> wind_m_s;
+  std::optional<double> wind_from_deg;       ///< clockwise from north
   std::optional<double> cloud_frac;          ///< opaque cover of the sky
   std::optional<double> longwave_down_w_m2;  ///< none: from air, dew point and cover
   // These are averages over the record.

@@ -2,11 +2,19 @@
 #include "emit/physics/weather.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "emit/physics/check.hpp"
 
 namespace emit::physics {
 namespace {
+
+/// Sets the direction to which the wind blows.
+void set_wind_direction(const std::optional<double>& from_rad, Forcing& f) noexcept {
+  if (!from_rad) return;
+  f.wind_to_east = -std::sin(*from_rad);
+  f.wind_to_north = -std::cos(*from_rad);
+}
 
 Forcing forcing_of(const WeatherSample& row) noexcept {
   Forcing f;
@@ -16,8 +24,10 @@ Forcing forcing_of(const WeatherSample& row) noexcept {
   f.air_k = row.air_k;
   f.environment_k = row.environment_k.value_or(row.air_k);
   f.environment_stated = row.environment_k.has_value();
-  f.film_w_m2_k = row.film_w_m2_k.value_or(film_coefficient_w_m2_k(row.wind_m_s));
+  f.stated_film_w_m2_k = row.film_w_m2_k.value_or(0.0);
+  f.stated_film_frac = row.film_w_m2_k ? 1.0 : 0.0;
   f.wind_m_s = row.wind_m_s;
+  set_wind_direction(row.wind_from_rad, f);
   f.cloud_frac = row.cloud_frac;
   return f;
 }
@@ -52,8 +62,11 @@ Forcing forcing_from_rows(std::span<const WeatherSample> rows, std::int64_t sim_
   f.air_k = mix(&Forcing::air_k);
   f.environment_k = mix(&Forcing::environment_k);
   f.environment_stated = a.environment_stated || b.environment_stated;
-  f.film_w_m2_k = mix(&Forcing::film_w_m2_k);
+  f.stated_film_w_m2_k = mix(&Forcing::stated_film_w_m2_k);
+  f.stated_film_frac = mix(&Forcing::stated_film_frac);
   f.wind_m_s = mix(&Forcing::wind_m_s);
+  f.wind_to_east = mix(&Forcing::wind_to_east);
+  f.wind_to_north = mix(&Forcing::wind_to_north);
   f.cloud_frac = mix(&Forcing::cloud_frac);
   return f;
 }
@@ -69,8 +82,9 @@ Forcing forcing_from_clear_sky(const ClearSky& model, const GeoPlace& place, con
   f.longwave_down_w_m2 = sky_longwave_w_m2(air, Kelvin(model.dew_point_k), model.cloud_frac);
   f.air_k = air.value();
   f.environment_k = air.value();
-  f.film_w_m2_k = film_coefficient_w_m2_k(model.wind_m_s);
   f.wind_m_s = model.wind_m_s;
+  set_wind_direction(model.wind_from_rad, f);
+  f.height_m = place.height.value();
   f.cloud_frac = model.cloud_frac;
   return f;
 }

@@ -173,7 +173,8 @@ std::vector<GroundForcing> ground_forcing(const scene::ScenarioDesc& scenario, d
                      : physics::forcing_from_rows(rows, sim_ns);
     out.push_back({time_s,
                    f.direct_normal_w_m2 * (1.0 - f.cloud_frac) * std::max(0.0, sun.direction_enu.z),
-                   f.diffuse_horizontal_w_m2, f.longwave_down_w_m2, f.film_w_m2_k, f.air_k});
+                   f.diffuse_horizontal_w_m2, f.longwave_down_w_m2, physics::typical_film_w_m2_k(f),
+                   f.air_k});
   }
   return out;
 }

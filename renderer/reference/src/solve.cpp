@@ -198,7 +198,8 @@ Result<void> SceneSolver::Data::choose_dimension(bool& three) {
   return {};
 }
 
-/// Names what no solution follows: the interiors of bodies, and parts that heat themselves.
+/// Names what no solution follows: the interiors of bodies, parts that heat themselves, and the air
+/// past moving or shaped objects.
 void SceneSolver::Data::note_interiors_and_parts() {
   for (const scene::Material& material : geometry.materials) {
     if (!material.rests_on_body()) continue;
@@ -208,6 +209,12 @@ void SceneSolver::Data::note_interiors_and_parts() {
                     material.name, material.base_k));
   }
   for (const scene::ObjectDesc& object : scenario.objects) {
+    const bool moves = object.trajectory.size() > 1;
+    if (moves || object.air_film.shape != physics::AirFilmShape::surface) {
+      notes.push_back(fmt::format(
+          "object '{}': its film is that of scenery in the wind, without its own speed{}",
+          object.name, moves ? "" : " and 'air_film'"));
+    }
     if (object.parts.empty()) continue;
     notes.push_back(fmt::format(
         "object '{}': [[object.parts]] has no effect, no part heats itself here", object.name));

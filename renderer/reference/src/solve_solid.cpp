@@ -35,8 +35,13 @@ ExchangeFace surface_of(const VoxelModel& model, const SolidFace& face,
                         const scene::SceneGeometry& geometry) {
   const VoxelFace info = model.face(face);
   const scene::Material& material = geometry.materials[info.material];
-  return {face.centre_m(),          face.normal(), face.area_m2, material.solar_absorptance_frac,
-          material.emissivity_frac, info.in_cavity};
+  return {face.centre_m(),
+          face.normal(),
+          face.area_m2,
+          material.solar_absorptance_frac,
+          material.emissivity_frac,
+          scene::roughness_factor(material.roughness),
+          info.in_cavity};
 }
 
 /// Temperature field of another solver's grid, trilinear between its nodes.
@@ -153,11 +158,13 @@ void SolidRadiation::drive(double time_s, std::span<const double> face_k, const 
                       open * sky.longwave_w_m2 + around * sky.ground_long_w_m2};
     }
   }
-  // Set the drive of every face.
+  // Set the drive of every face, with the film at its temperature now.
+  const physics::AirFilm film = physics::air_film(now.flow);
   const double cavity4 = std::pow(model_.cavity_k(), 4);
   for (std::size_t f = 0; f < n; ++f) {
     const ExchangeFace& s = surfaces_[f];
-    out.film_w_m2_k[f] = s.enclosed ? 0.0 : now.film_w_m2_k;
+    out.film_w_m2_k[f] =
+        s.enclosed ? 0.0 : physics::film_w_m2_k(film, s.normal, s.roughness, face_k[f] - now.air_k);
     out.air_k[f] = now.air_k;
     out.absorbed_w_m2[f] =
         s.enclosed ? s.emissivity_frac * physics::kStefanBoltzmannWPerM2K4 * cavity4

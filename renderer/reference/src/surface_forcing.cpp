@@ -40,10 +40,11 @@ struct Weather {
   [[nodiscard]] ClimateNode at(std::int64_t time_ns, bool before, bool& stated) const {
     // Evaluate the input models.
     const physics::SunPosition sun = physics::sun_position(epoch_utc_ns + time_ns, place);
-    const physics::Forcing forcing =
+    physics::Forcing forcing =
         rows.empty()
             ? physics::forcing_from_clear_sky(clear_sky, place, sun, epoch_utc_ns + time_ns)
             : physics::forcing_from_rows(rows, before ? time_ns - 1 : time_ns);
+    forcing.height_m = place.height.value();
     ClimateNode node;
     node.time_ns = time_ns;
     node.to_sun = sun.direction_enu;
@@ -53,7 +54,7 @@ struct Weather {
     node.diffuse_horizontal_w_m2 = forcing.diffuse_horizontal_w_m2;
     node.longwave_down_w_m2 = forcing.longwave_down_w_m2;
     node.air_k = forcing.air_k;
-    node.film_w_m2_k = forcing.film_w_m2_k;
+    node.flow = physics::air_flow(forcing);
     node.surroundings_k = forcing.environment_k;
     stated = forcing.environment_stated;
     return node;
@@ -107,8 +108,10 @@ FaceState face_state(const ClimateNode& climate, const SurfaceOptics& surface,
       view.scene_shortwave_w_m2 + ground_frac * surroundings_reflectance_frac * global;
   const double longwave = view.sky_frac * climate.longwave_down_w_m2 + view.scene_longwave_w_m2 +
                           ground_frac * physics::kStefanBoltzmannWPerM2K4 * env2 * env2;
-  return {surface.solar_absorptance_frac * shortwave + surface.emissivity_frac * longwave,
-          climate.film_w_m2_k, climate.air_k};
+  return {surface.solar_absorptance_frac * shortwave + surface.emissivity_frac * longwave, 0.0,
+          climate.air_k,
+          FaceFilm{physics::air_film(climate.flow), surface.normal, surface.roughness,
+                   surface.both_sides}};
 }
 
 ViewSample open_view(const glm::dvec3& normal) noexcept {
@@ -147,7 +150,7 @@ ClimateNode SurfaceClimate::at(std::int64_t time_ns) const noexcept {
           mix(a.diffuse_horizontal_w_m2, b.diffuse_horizontal_w_m2),
           mix(a.longwave_down_w_m2, b.longwave_down_w_m2),
           mix(a.air_k, b.air_k),
-          mix(a.film_w_m2_k, b.film_w_m2_k),
+          physics::between_flows(a.flow, b.flow, f),
           mix(a.surroundings_k, b.surroundings_k)};
 }
 
@@ -203,8 +206,10 @@ Result<SurfaceClimate> SurfaceClimate::create(const scene::ScenarioDesc& scenari
   if (!mesh) return tl::unexpected(std::move(mesh.error()));
   std::vector<double> ground_k(climate.nodes_.size(), ground->prescribed_k.value_or(0.0));
   if (!ground->prescribed_k) {
-    const SurfaceOptics surface{
-        {0.0, 0.0, 1.0}, ground->solar_absorptance_frac, ground->emissivity_frac};
+    const SurfaceOptics surface{{0.0, 0.0, 1.0},
+                                ground->solar_absorptance_frac,
+                                ground->emissivity_frac,
+                                scene::roughness_factor(ground->roughness)};
     std::vector<ForcingRow> rows;
     std::vector<double> times_s;
     for (const ClimateNode& node : climate.nodes_) {

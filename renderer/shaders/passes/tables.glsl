@@ -4,13 +4,16 @@ layout(binding = EMIT_TEX_MATERIALS) uniform samplerBuffer material_table;     /
 layout(binding = EMIT_TEX_RELAXATION) uniform samplerBuffer relaxation_table;  // RelaxationParams
 
 // Surface of a material: solar absorptance, emissivity, conductance in W m-2 K-1, base temperature in K.
-vec4 material_surface(int material) { return texelFetch(material_table, material * 3); }
+vec4 material_surface(int material) { return texelFetch(material_table, material * 4); }
 
 // Temperatures of a material: initial offset in K, prescribed offset in K, 1 if prescribed, base offset in K.
-vec4 material_start(int material) { return texelFetch(material_table, material * 3 + 1); }
+vec4 material_start(int material) { return texelFetch(material_table, material * 4 + 1); }
 
 // Resistances of the four modes of a material in m2 K W-1.
-vec4 material_resistance_m2k_w(int material) { return texelFetch(material_table, material * 3 + 2); }
+vec4 material_resistance_m2k_w(int material) { return texelFetch(material_table, material * 4 + 2); }
+
+// Roughness factor of a material.
+float material_roughness(int material) { return texelFetch(material_table, material * 4 + 3).x; }
 
 // Mode 0 or 1 of emit2014: gain at the start, gain at the end, weight, 0.
 vec4 relaxation_mode(int entry, int mode) { return texelFetch(relaxation_table, entry * 2 + mode); }

@@ -6,6 +6,7 @@
 #include "passes/gbuffer.glsl"
 #include "passes/pcss.glsl"
 #include "passes/tables.glsl"
+#include "lib/air_film.glsl"
 #include "lib/foster.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -73,20 +74,23 @@ void main() {
   s.base_offset_k = start.w;
   s.reference_k = frame.reference_k;
 
+  // Read the states and take the film at the temperature at the start.
+  vec4 x0 = (flags & EMIT_STEP_FIRST) != 0u ? spun_up_states(material, n) : imageLoad(state_image, px);
+  float roughness = material_roughness(material);
+  float excess_k = foster_offset_k(x0, s) - step_params.air_start_offset_k;
   // Set up the drive at both ends: absorbed flux, film coefficient, air temperature.
   vec3 begin = vec3(absorbed_indirect_w_m2(surface, step_params.diffuse_start_w_m2, step_params.longwave_start_w_m2,
                                            step_params.reflected_start_w_m2, step_params.environment_start_w_m2,
                                            sky_frac),
-                    step_params.film_start_w_m2_k, step_params.air_start_offset_k);
+                    film_w_m2_k(step_params.film_start, n, roughness, excess_k), step_params.air_start_offset_k);
   vec3 end = vec3(absorbed_indirect_w_m2(surface, step_params.diffuse_end_w_m2, step_params.longwave_end_w_m2,
                                          step_params.reflected_end_w_m2, step_params.environment_end_w_m2, sky_frac),
-                  step_params.film_end_w_m2_k, step_params.air_end_offset_k);
+                  film_w_m2_k(step_params.film_end, n, roughness, excess_k), step_params.air_end_offset_k);
   float absorbed_frac = surface.x * sun_frac;
   vec3 lit_begin = begin + vec3(absorbed_frac * max(sun_begin, 0.0), 0.0, 0.0);
   vec3 lit_end = end + vec3(absorbed_frac * max(sun_end, 0.0), 0.0, 0.0);
 
   // Advance over the whole interval in one step.
-  vec4 x0 = (flags & EMIT_STEP_FIRST) != 0u ? spun_up_states(material, n) : imageLoad(state_image, px);
   bool clamped = false;
   int entry = int(step_params.relaxation_offset) + material * (EMIT_FOSTER_LEVELS + 1);
   vec4 x = foster_step(x0, lit_begin, lit_end, foster_start_frac(entry), foster_end_frac(entry), s, clamped);

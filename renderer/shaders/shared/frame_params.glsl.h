@@ -47,7 +47,7 @@ struct DrawParams {
   float moved_frac;          // cached: EntityStand::moved_frac of an entity
 };
 
-// Three texels of the material table.
+// Four texels of the material table.
 struct MaterialParams {
   float solar_absorptance_frac;
   float emissivity_frac;
@@ -58,6 +58,10 @@ struct MaterialParams {
   float prescribed;           // 1: the temperature is prescribed; 0: it is simulated
   float base_offset_k;        // foster: base temperature minus the reference temperature
   vec4 resistance_m2k_w;      // foster: resistance of each mode
+  float roughness;            // foster: factor of the forced part of the film
+  float unused0;
+  float unused1;
+  float unused2;
 };
 
 // One light frustum of a history interval. Its coordinates are in metres.
@@ -78,6 +82,24 @@ struct TapParams {
   vec4 filter_[EMIT_MAX_TAPS];
 };
 
+// Air past a surface at an instant, the twin of physics::AirFilm (physics.md eq. 31 to 35).
+struct FilmParams {
+  vec3 upwind;              // unit vector to where the wind comes from, world axes; 0: not known
+  float directed_frac;      // share of the wind whose direction is known
+  float windward_w_m2_k;    // forced part on a smooth windward face
+  float leeward_w_m2_k;     // forced part on a smooth leeward face
+  float vertical_root;      // natural part of a vertical face: (root + rise |dT|^1/6)^2
+  float vertical_rise;
+  float unstable_quarter;   // natural part of a level face over unstable air: factor of |dT|^1/4
+  float unstable_third;     // factor of |dT|^1/3; the greater one counts
+  float stable_quarter;     // the same over stable air: factor of |dT|^1/4
+  float rough_frac;         // share of the material's roughness that counts
+  float stated_w_m2_k;      // film that the user gave, multiplied by its share
+  float model_frac;         // share of the model in the rest
+  float unused0;
+  float unused1;
+};
+
 // Uniform block of one interval of the thermal history. "start" and "end" are its two ends.
 struct StepParams {
   CascadeParams cascades[EMIT_MAX_CASCADES];
@@ -93,14 +115,12 @@ struct StepParams {
   float longwave_end_w_m2;
   float reflected_end_w_m2;
   float environment_end_w_m2;
-  float film_start_w_m2_k;        // foster: film coefficient
+  FilmParams film_start;          // foster: film coefficient
+  FilmParams film_end;
   float air_start_offset_k;       // foster: air temperature minus the reference temperature
-  float film_end_w_m2_k;
   float air_end_offset_k;
   float casters_top_m;            // height of the highest caster above the camera
   float casters_sun_sine;         // sine of the sun's elevation at the sample of the interval
-  float unused0;
-  float unused1;
   uint cascade_count;             // entries of `cascades`; 0: nothing can be shaded
   uint relaxation_offset;         // first entry of the interval in the relaxation table
   uint flags;                     // EMIT_STEP_*
@@ -153,22 +173,28 @@ EMIT_SHARED_OFFSET(FrameParams, to_sun, 176);
 EMIT_SHARED_OFFSET(FrameParams, sun_up, 188);
 static_assert(sizeof(DrawParams) == 128);
 EMIT_SHARED_OFFSET(DrawParams, material, 112);
-static_assert(sizeof(MaterialParams) == 48);
+static_assert(sizeof(MaterialParams) == 64);
 EMIT_SHARED_OFFSET(MaterialParams, initial_offset_k, 16);
 EMIT_SHARED_OFFSET(MaterialParams, resistance_m2k_w, 32);
+EMIT_SHARED_OFFSET(MaterialParams, roughness, 48);
 static_assert(sizeof(CascadeParams) == 80);
 EMIT_SHARED_OFFSET(CascadeParams, scale_per_m, 48);
 EMIT_SHARED_OFFSET(CascadeParams, end_boresight_m, 60);
 EMIT_SHARED_OFFSET(CascadeParams, drift_frac, 64);
 static_assert(sizeof(TapParams) == 2 * EMIT_MAX_TAPS * 16);
-static_assert(sizeof(StepParams) == 80 * EMIT_MAX_CASCADES + 112);
+static_assert(sizeof(FilmParams) == 64);
+EMIT_SHARED_OFFSET(FilmParams, windward_w_m2_k, 16);
+EMIT_SHARED_OFFSET(FilmParams, unstable_quarter, 32);
+EMIT_SHARED_OFFSET(FilmParams, stated_w_m2_k, 48);
+static_assert(sizeof(StepParams) == 80 * EMIT_MAX_CASCADES + 224);
 EMIT_SHARED_OFFSET(StepParams, to_sun_start, 80 * EMIT_MAX_CASCADES);
 EMIT_SHARED_OFFSET(StepParams, to_sun_end, 80 * EMIT_MAX_CASCADES + 16);
 EMIT_SHARED_OFFSET(StepParams, diffuse_start_w_m2, 80 * EMIT_MAX_CASCADES + 32);
 EMIT_SHARED_OFFSET(StepParams, diffuse_end_w_m2, 80 * EMIT_MAX_CASCADES + 48);
-EMIT_SHARED_OFFSET(StepParams, film_start_w_m2_k, 80 * EMIT_MAX_CASCADES + 64);
-EMIT_SHARED_OFFSET(StepParams, casters_top_m, 80 * EMIT_MAX_CASCADES + 80);
-EMIT_SHARED_OFFSET(StepParams, cascade_count, 80 * EMIT_MAX_CASCADES + 96);
+EMIT_SHARED_OFFSET(StepParams, film_start, 80 * EMIT_MAX_CASCADES + 64);
+EMIT_SHARED_OFFSET(StepParams, film_end, 80 * EMIT_MAX_CASCADES + 128);
+EMIT_SHARED_OFFSET(StepParams, air_start_offset_k, 80 * EMIT_MAX_CASCADES + 192);
+EMIT_SHARED_OFFSET(StepParams, cascade_count, 80 * EMIT_MAX_CASCADES + 208);
 static_assert(sizeof(RelaxationParams) == 32);
 static_assert(sizeof(BandParams) == 80);
 EMIT_SHARED_OFFSET(BandParams, air_radiance_w_m2_sr, 32);

@@ -103,13 +103,46 @@ FosterHeat::Incoming FosterHeat::into_body(const Incoming& own, bool own_covered
           0.5 * (own.longwave_w_m2 + other.longwave_w_m2)};
 }
 
-FosterDrive<double> FosterHeat::absorbed(std::uint32_t material, const SurfaceForcing& forcing,
+FosterHeat::FilmSpan FosterHeat::film_over(const SampleAdvance& each,
+                                           const IntervalForcing& forcing) const noexcept {
+  const SurfaceSample& sample = *each.sample;
+  const EntityAir* air = each.drive.air;
+  const physics::AirFilm& begin = air != nullptr ? air->begin : forcing.begin.film;
+  const physics::AirFilm& end = air != nullptr ? air->end : forcing.end.film;
+  FilmSpan out;
+  out.begin.air_k = air != nullptr ? air->begin_air_k : forcing.begin.air_k;
+  out.end.air_k = air != nullptr ? air->end_air_k : forcing.end.air_k;
+  const double excess_k = reference_k_ + offset_k(sample.material, *each.state) - out.begin.air_k;
+  const double roughness = materials_[sample.material].roughness;
+  const auto add_face = [&](const glm::dvec3& normal, double share_frac) {
+    const double natural = physics::natural_film_w_m2_k(begin, normal.z, excess_k);
+    out.begin.film_w_m2_k +=
+        share_frac * physics::joined_film_w_m2_k(
+                         begin, natural, physics::forced_film_w_m2_k(begin, normal), roughness);
+    out.end.film_w_m2_k +=
+        share_frac * physics::joined_film_w_m2_k(
+                         end, natural, physics::forced_film_w_m2_k(end, normal), roughness);
+  };
+  // Take the mean of both faces of a sheet. A covered face has no film, so the open one counts.
+  const glm::dvec3 normal(each.normal);
+  if (each.back == nullptr || each.back->sample.covered) {
+    add_face(normal, 1.0);
+  } else if (sample.covered) {
+    add_face(-normal, 1.0);
+  } else {
+    add_face(normal, 0.5);
+    add_face(-normal, 0.5);
+  }
+  return out;
+}
+
+FosterDrive<double> FosterHeat::absorbed(std::uint32_t material, const FilmDrive& film,
                                          const Incoming& in, const PartHeat& part) const noexcept {
   FosterDrive<double> drive{
       .absorbed_w_m2 = materials_[material].solar_absorptance_frac * in.shortwave_w_m2 +
                        materials_[material].emissivity_frac * in.longwave_w_m2 + part.power_w_m2,
-      .film_w_m2_k = forcing.film_w_m2_k,
-      .air_offset_k = forcing.air_k - reference_k_};
+      .film_w_m2_k = film.film_w_m2_k,
+      .air_offset_k = film.air_k - reference_k_};
   if (part.contact_w_m2_k > 0.0) {
     // Join film and contact to one conductance, to the mean temperature of their far ends.
     const double film_w_m2 = drive.film_w_m2_k * drive.air_offset_k;
@@ -120,7 +153,7 @@ FosterDrive<double> FosterHeat::absorbed(std::uint32_t material, const SurfaceFo
   return drive;
 }
 
-SampleOutput FosterHeat::output_of(const SurfaceSample& sample, const SurfaceForcing& forcing,
+SampleOutput FosterHeat::output_of(const SurfaceSample& sample, const FilmDrive& film,
                                    const Incoming& in, const SampleDrive& drive,
                                    const PartHeat& part, double offset_k) const noexcept {
   const FosterMaterial& m = materials_[sample.material];
@@ -135,7 +168,7 @@ SampleOutput FosterHeat::output_of(const SurfaceSample& sample, const SurfaceFor
   // Give the net flux to partners, which it drives. A covered face has none.
   if (!m.prescribed() && !sample.covered) {
     out.flux_w_m2 = static_cast<float>(physics::foster_flux_w_m2(
-        offset_k, absorbed(sample.material, forcing, in, part), surfaces_[sample.material]));
+        offset_k, absorbed(sample.material, film, in, part), surfaces_[sample.material]));
   }
   return out;
 }
@@ -152,11 +185,19 @@ SampleOutput FosterHeat::output(const SurfaceSample& sample, const glm::vec3& no
                                 const SurfaceForcing& forcing, const SampleDrive& drive,
                                 const SampleState& state) const noexcept {
   const Incoming in = incoming(sample, normal, forcing, drive, drive.longwave_begin_w_m2);
-  return output_of(sample, forcing, in, drive, drive.part.begin, offset_k(sample.material, state));
+  const double offset = offset_k(sample.material, state);
+  const EntityAir* air = drive.air;
+  FilmDrive film;
+  film.air_k = air != nullptr ? air->begin_air_k : forcing.air_k;
+  film.film_w_m2_k = physics::film_w_m2_k(air != nullptr ? air->begin : forcing.film,
+                                          glm::dvec3(normal), materials_[sample.material].roughness,
+                                          reference_k_ + offset - film.air_k);
+  return output_of(sample, film, in, drive, drive.part.begin, offset);
 }
 
 bool FosterHeat::begin_advance(const SampleAdvance& each, const HeatInterval& interval,
-                               const Incoming& end, physics::FosterLane& lane) const noexcept {
+                               const Incoming& end, const FilmSpan& film,
+                               physics::FosterLane& lane) const noexcept {
   const SurfaceSample& sample = *each.sample;
   const SampleDrive& drive = each.drive;
   const IntervalForcing& forcing = interval.forcing;
@@ -192,8 +233,8 @@ bool FosterHeat::begin_advance(const SampleAdvance& each, const HeatInterval& in
     return false;
   }
   lane.x = &each.state->modes_k;
-  lane.begin = absorbed(sample.material, forcing.begin, body_begin, drive.part.begin);
-  lane.end = absorbed(sample.material, forcing.end, body_end, drive.part.end);
+  lane.begin = absorbed(sample.material, film.begin, body_begin, drive.part.begin);
+  lane.end = absorbed(sample.material, film.end, body_end, drive.part.end);
   return true;
 }
 
@@ -235,19 +276,22 @@ void FosterHeat::advance_group(std::span<SampleAdvance> group,
   const SurfaceForcing& at_end = interval.forcing.end;
   // Collect the samples whose own modes the surface balance drives.
   std::array<Incoming, most> ends;
+  std::array<FilmDrive, most> end_films;
   std::array<physics::FosterLane, most> lanes;
   std::size_t count = 0;
   for (std::size_t i = 0; i < group.size(); ++i) {
     const SampleAdvance& each = group[i];
     ends[i] = incoming(*each.sample, each.normal, at_end, each.drive, each.drive.longwave_end_w_m2);
     if (materials_[each.sample->material].prescribed()) continue;
-    if (begin_advance(each, interval, ends[i], lanes[count])) ++count;
+    const FilmSpan film = film_over(each, interval.forcing);
+    end_films[i] = film.end;
+    if (begin_advance(each, interval, ends[i], film, lanes[count])) ++count;
   }
   physics::foster_advance_all(std::span(lanes).first(count), tolerance_k_);
   for (std::size_t i = 0; i < group.size(); ++i) {
     SampleAdvance& each = group[i];
     count_from_body(each, 1.0);
-    each.output = output_of(*each.sample, at_end, ends[i], each.drive, each.drive.part.end,
+    each.output = output_of(*each.sample, end_films[i], ends[i], each.drive, each.drive.part.end,
                             offset_k(each.sample->material, *each.state));
   }
 }
@@ -267,8 +311,10 @@ void FosterHeat::advance_unshadowed(std::uint32_t material, const glm::vec3& nor
                                     const HeatInterval& interval,
                                     FosterState<double>& modes_k) const noexcept {
   if (materials_[material].prescribed()) return;
+  const double offset_k = physics::foster_offset_k(modes_k, surfaces_[material]);
   const auto drive = [&](const SurfaceForcing& forcing) {
-    return unshadowed_drive(forcing, materials_[material], glm::dvec3(normal), reference_k_);
+    return unshadowed_drive(forcing, materials_[material], glm::dvec3(normal), reference_k_,
+                            offset_k);
   };
   physics::foster_advance(modes_k, drive(interval.forcing.begin), drive(interval.forcing.end),
                           interval.ladders[material], surfaces_[material], tolerance_k_);

@@ -103,11 +103,22 @@ class FosterHeat {
   [[nodiscard]] Incoming into_body(const Incoming& own, bool own_covered, const glm::vec3& normal,
                                    const SurfaceForcing& forcing, const SheetBack* back,
                                    double SampleDrive::*longwave_w_m2) const noexcept;
+  /// Film and air of a face, or their mean over both faces of a sheet.
+  struct FilmDrive {
+    double film_w_m2_k = 0.0;
+    double air_k = 0.0;
+  };
+  /// Film and air at both ends of an interval.
+  struct FilmSpan {
+    FilmDrive begin;
+    FilmDrive end;
+  };
   /// Advances what a sample does not share with others: modes that its partners drive, and the own
   /// modes of a covered one. If the surface balance drives its own modes, it returns true and fills
   /// `lane`. `end` is what arrives at the face at the end of the interval.
   [[nodiscard]] bool begin_advance(const SampleAdvance& each, const HeatInterval& interval,
-                                   const Incoming& end, physics::FosterLane& lane) const noexcept;
+                                   const Incoming& end, const FilmSpan& film,
+                                   physics::FosterLane& lane) const noexcept;
   /// Counts the modes of a sample on a body from its interior (`sign` = -1), or from the base of
   /// its material again (+1), physics.md eq. 27. Returns how much warmer the interior is than that
   /// base.
@@ -115,14 +126,16 @@ class FosterHeat {
   /// Advances up to `most` samples.
   template <std::size_t most>
   void advance_group(std::span<SampleAdvance> group, const HeatInterval& interval) const noexcept;
+  /// Returns film and air over an interval. The natural part follows the temperature at its begin.
+  [[nodiscard]] FilmSpan film_over(const SampleAdvance& each,
+                                   const IntervalForcing& forcing) const noexcept;
   /// Returns the input of the surface balance: absorbed flux A, film and air, with the heat of a
   /// part.
-  [[nodiscard]] physics::FosterDrive<double> absorbed(std::uint32_t material,
-                                                      const SurfaceForcing& forcing,
+  [[nodiscard]] physics::FosterDrive<double> absorbed(std::uint32_t material, const FilmDrive& film,
                                                       const Incoming& in,
                                                       const PartHeat& part) const noexcept;
   /// Returns the output of a sample of known temperature.
-  [[nodiscard]] SampleOutput output_of(const SurfaceSample& sample, const SurfaceForcing& forcing,
+  [[nodiscard]] SampleOutput output_of(const SurfaceSample& sample, const FilmDrive& film,
                                        const Incoming& in, const SampleDrive& drive,
                                        const PartHeat& part, double offset_k) const noexcept;
   /// Returns the surface temperature as an offset from the reference temperature, partners

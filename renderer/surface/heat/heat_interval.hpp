@@ -11,6 +11,7 @@
 #include "emit/physics/foster.hpp"
 #include "emit/physics/relaxation.hpp"
 #include "emit/renderer/surface_forcing.hpp"
+#include "history/entity_air.hpp"
 #include "history/part_history.hpp"
 #include "surface/heat/surface_samples.hpp"
 
@@ -19,14 +20,16 @@ namespace emit::renderer {
 /// Largest number of relaxation modes of a material (physics.md eq. 5). Further modes are ignored.
 inline constexpr std::size_t kMaxRelaxationModes = 2;
 
-/// Drives of the parts over an interval, by entity and material. Plain data; find() is RT-safe.
-struct PartForcing {
+/// Inputs that act on entities alone over an interval: the drives of their parts, by entity and
+/// material, and the air past them. The type is plain data; find() is RT-safe.
+struct EntityForcing {
   struct Part {
     std::size_t entity = 0;
     std::uint32_t material = 0;
     PartHeatSpan heat;
   };
-  std::vector<Part> parts;  ///< ascending by entity
+  std::vector<Part> parts;      ///< ascending by entity
+  std::vector<EntityAir> airs;  ///< by entity; empty before the history
 
   /// Returns the drive of the samples of an entity with a material; null if no part has them.
   [[nodiscard]] const Part* find(const SurfaceSample& sample) const noexcept {
@@ -38,9 +41,14 @@ struct PartForcing {
     }
     return nullptr;
   }
-  /// Sets the drives for an interval, of the same parts in the same order. It allocates the first
-  /// time.
-  void update(std::span<const PartHistory> histories, std::int64_t begin_ns, std::int64_t end_ns) {
+  /// Sets the drives and the air for an interval, of the same parts and entities in the same order.
+  /// It allocates the first time.
+  void update(std::span<const PartHistory> histories, std::span<const PoseHistory> entities,
+              const IntervalForcing& forcing, std::int64_t begin_ns, std::int64_t end_ns) {
+    airs.resize(entities.size());
+    for (std::size_t i = 0; i < entities.size(); ++i) {
+      airs[i] = entity_air(entities[i], forcing, begin_ns, end_ns);
+    }
     parts.resize(histories.size());
     for (std::size_t i = 0; i < histories.size(); ++i) {
       parts[i] = {histories[i].entity(), histories[i].material(),
@@ -71,10 +79,16 @@ struct SampleDrive {
   std::array<double, kMaxPartners> partner_end_w_m2{};
   /// Heat of the part that the sample belongs to (physics.md eq. 29).
   PartHeatSpan part;
+  /// Air past the sample's entity, in the forcing of the interval. Null: the air of the scenery.
+  const EntityAir* air = nullptr;
 
-  /// Takes the heat of the sample's part from the forcing of an interval.
-  void take_part(const PartForcing& parts, const SurfaceSample& sample) noexcept {
-    if (const PartForcing::Part* found = parts.find(sample)) part = found->heat;
+  /// Takes the heat of the sample's part and the air past its entity from the forcing of an
+  /// interval, which must outlive the drive.
+  void take_entity(const EntityForcing& entities, const SurfaceSample& sample) noexcept {
+    if (const EntityForcing::Part* found = entities.find(sample)) part = found->heat;
+    if (sample.entity >= 0 && !entities.airs.empty()) {
+      air = &entities.airs[static_cast<std::size_t>(sample.entity)];
+    }
   }
 };
 
@@ -110,7 +124,7 @@ struct HeatInterval {
   using Relaxation = std::array<physics::RelaxationGains<double>, kMaxRelaxationModes>;
 
   IntervalForcing forcing;
-  PartForcing parts;
+  EntityForcing entities;
   std::vector<physics::FosterLadder> ladders;  ///< gains of the model foster
   std::vector<Relaxation> relaxation;          ///< gains of the model emit2014
 };

@@ -20,7 +20,8 @@ void append(HistoryRecord& record, const HistoryInterval& interval, const Interv
             std::int64_t end_ns, const RecordInputs& inputs) {
   const auto turn = static_cast<std::uint32_t>(record.size());
   record.intervals.push_back(heat_interval(forcing, inputs.heat));
-  record.intervals.back().parts.update(inputs.parts, interval.begin_ns, interval.end_ns);
+  record.intervals.back().entities.update(inputs.parts, inputs.entities, forcing, interval.begin_ns,
+                                          interval.end_ns);
   IntervalRays& rays = record.rays.emplace_back(inputs.prototype);
   rays.update(interval.begin_ns, interval.end_ns, turn, inputs.environment,
               EntityPoses(inputs.entities), inputs.origin_world_m);

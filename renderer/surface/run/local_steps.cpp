@@ -82,6 +82,7 @@ LocalSteps::LocalSteps(const SurfaceSamples& all, const Setup& setup, const Inte
       known_found_(setup.entities, 0),
       own_clock_(all.samples.size(), 0) {
   rays_.take_short();
+  interval_.entities.airs.resize(setup.entities);
   for (const PartHistory& part : setup.parts) {
     part_blocks_.push_back(blocks_of(part, blocks_, all));
   }
@@ -246,7 +247,7 @@ void LocalSteps::prepare(std::int64_t begin_ns, std::int64_t end_ns, const Windo
   inputs.history.restore_surroundings(between(window.before.surroundings, window.after.surroundings,
                                               way_of(begin_ns, window.before, window.after)));
   interval_.forcing = inputs.history.extend(begin_ns, end_ns, inputs.environment);
-  interval_.parts.update(inputs.parts, begin_ns, end_ns);
+  interval_.entities.update(inputs.parts, inputs.entities, interval_.forcing, begin_ns, end_ns);
   inputs.step.heat.prepare(interval_);
   rays_.update(begin_ns, end_ns, static_cast<std::uint32_t>(end_ns / step_ns_), inputs.environment,
                EntityPoses::ahead(inputs.entities), inputs.origin_world_m);

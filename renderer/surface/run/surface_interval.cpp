@@ -26,7 +26,9 @@ SurfaceInterval::SurfaceInterval(const SurfaceGeometry& geometry, const SampleHe
     : geometry_(geometry),
       heat_(heat),
       rays_(geometry.entity_radii_m(), heat.sky_measure()),
-      interval_(heat.sized_interval()) {}
+      interval_(heat.sized_interval()) {
+  interval_.entities.airs.resize(geometry.entities());
+}
 
 void SurfaceInterval::reset(const SurfaceModel& model, std::vector<EntityAnchor> anchors,
                             bool exchange, std::uint32_t turn) {
@@ -49,7 +51,7 @@ void SurfaceInterval::begin(const SurfaceNode& from, SurfaceNode& to, const Surf
   // Fill the forcing, which also advances the surroundings to the end of the interval.
   history.restore_surroundings(from.surroundings);
   interval_.forcing = history.extend(from.at_ns, to.at_ns, inputs.environment);
-  interval_.parts.update(inputs.parts, from.at_ns, to.at_ns);
+  interval_.entities.update(inputs.parts, inputs.entities, interval_.forcing, from.at_ns, to.at_ns);
   to.forcing = interval_.forcing;
   to.surroundings = history.surroundings();
   to.surroundings_k = history.surroundings_now_k();

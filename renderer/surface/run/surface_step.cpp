@@ -117,14 +117,14 @@ class ViewedSample {
 
 /// Input of a sample over an interval. Other samples count with their output at its begin.
 SampleDrive drive_of(const SurfaceStep& step, const IntervalRays& interval_rays,
-                     const PartForcing& parts, std::span<const SampleOutput> begin,
+                     const EntityForcing& entities, std::span<const SampleOutput> begin,
                      const ViewedSample& viewed, const RayOffsets& offsets,
                      const SunShare& sun) noexcept {
   const SurfaceSample& sample = viewed.sample();
   const ViewOfNow& view = viewed.view();
   SampleDrive drive;
   drive.sun_frac = sun.frac;
-  drive.take_part(parts, sample);
+  drive.take_entity(entities, sample);
   if (sample.body >= 0) drive.body_k = step.body_k[static_cast<std::size_t>(sample.body)];
   // Replace the sky behind entities by the long-wave radiation of the one that hides most.
   const HiddenSky hidden = interval_rays.hidden_sky(step.rays, sample, offsets.around_m);
@@ -196,7 +196,7 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
   };
   const SunShare sun = sun_of(sample);
   const SampleDrive drive =
-      drive_of(step, interval_rays, interval.parts, begin, viewed, offsets, sun);
+      drive_of(step, interval_rays, interval.entities, begin, viewed, offsets, sun);
   const glm::vec3 normal = interval_rays.normal(sample);
   if (sample.other_side == kNoSample) {
     stepped.output = step.heat.advance(sample, normal, interval, drive, stepped.state);
@@ -209,7 +209,7 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
   const SurfaceSample& behind = viewed_behind.sample();
   const SunShare sun_behind = sun_of(behind);
   const SampleDrive back_drive =
-      drive_of(step, interval_rays, interval.parts, begin, viewed_behind, offsets, sun_behind);
+      drive_of(step, interval_rays, interval.entities, begin, viewed_behind, offsets, sun_behind);
   const SheetBack back{behind, back_drive};
   stepped.output = step.heat.advance(sample, normal, interval, drive, stepped.state, &back);
   stepped.behind =

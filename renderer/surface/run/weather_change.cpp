@@ -18,6 +18,8 @@ constexpr double kMinChangeWM2K = 5.0;
 /// Typical difference in K between sunlit surfaces and the air. It turns a change of the film
 /// coefficient into a flux.
 constexpr double kFilmK = 20.0;
+/// Roughness factor of a typical surface.
+constexpr double kRoughness = 1.52;
 
 }  // namespace
 
@@ -32,11 +34,17 @@ bool weather_matters(const SurfaceNode& node, std::int64_t now_ns, const Environ
   const auto off = [&](double SurfaceForcing::*value) {
     return std::abs(is.*value - between(taken.begin.*value, taken.end.*value, way));
   };
+  // Compare the film of a level face that much above the air.
+  const auto film_w_m2_k = [](const SurfaceForcing& forcing) {
+    return physics::film_w_m2_k(forcing.film, glm::dvec3(0.0, 0.0, 1.0), kRoughness, kFilmK);
+  };
+  const double film_change_w_m2_k =
+      std::abs(film_w_m2_k(is) - between(film_w_m2_k(taken.begin), film_w_m2_k(taken.end), way));
   // Bound the change of the flux into a surface by the sum of the changes of all its parts.
   double change_w_m2 =
       glm::distance(is.sun_w_m2, glm::mix(taken.begin.sun_w_m2, taken.end.sun_w_m2, way)) +
       off(&SurfaceForcing::diffuse_w_m2) + off(&SurfaceForcing::longwave_w_m2) +
-      is.film_w_m2_k * off(&SurfaceForcing::air_k) + kFilmK * off(&SurfaceForcing::film_w_m2_k);
+      film_w_m2_k(is) * off(&SurfaceForcing::air_k) + kFilmK * film_change_w_m2_k;
   if (weather.environment_stated) {
     change_w_m2 += std::abs(physics::environment_input_w_m2(1.0, weather.environment_k) -
                             between(taken.begin.environment_w_m2, taken.end.environment_w_m2, way));

@@ -25,6 +25,7 @@ void add_weather(Fnv64& hash, const physics::WeatherSample& row) {
       row.longwave_down_w_m2, row.air_k, row.wind_m_s, row.cloud_frac);
   add_optional(hash, row.environment_k);
   add_optional(hash, row.film_w_m2_k);
+  add_optional(hash, row.wind_from_rad);
 }
 
 void add_pose(Fnv64& hash, const physics::Pose& pose) {
@@ -55,7 +56,7 @@ std::uint64_t scene_hash(const scene::ScenarioDesc& scenario,
   }
   for (const scene::ObjectDesc& object : scenario.objects) {
     add(hash, object.entity_id, object.on, object.interior.heat_j_m2_k,
-        object.interior.ventilation_w_m2_k);
+        object.interior.ventilation_w_m2_k, object.air_film.shape, object.air_film.length_m);
     add_keys(hash, object.trajectory);
     for (const scene::PartDesc& part : object.parts) {
       add(hash, part.id, part.material, part.curve.given, part.curve.idle_k, part.curve.full_k,
@@ -73,7 +74,7 @@ std::uint64_t scene_hash(const scene::ScenarioDesc& scenario,
 void add_material(Fnv64& hash, const scene::Material& material) {
   add(hash, material.solar_absorptance_frac, material.emissivity_frac, material.base_k,
       material.layers.size(), material.foster_modes.size(), material.modes.size(), material.sheet,
-      material.rests_on_body());
+      material.rests_on_body(), material.roughness);
   for (const scene::Layer& layer : material.layers) {
     add(hash, layer.thickness_m, layer.conductivity_w_m_k, layer.density_kg_m3,
         layer.specific_heat_j_kg_k);
@@ -117,6 +118,7 @@ std::uint64_t weather_hash(const scene::ScenarioDesc& scenario) {
   const scene::ClearSky& sky = scenario.clear_sky;
   add(hash, sky.linke_turbidity, sky.air_mean_k, sky.air_amplitude_k, sky.dew_point_k, sky.wind_m_s,
       sky.cloud_frac);
+  add_optional(hash, sky.wind_from_rad);
   return hash.value();
 }
 

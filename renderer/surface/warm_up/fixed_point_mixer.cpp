@@ -27,7 +27,7 @@ void by_terms(std::size_t count, const Body& body) {
 /// `a` is as good as singular gets 0.
 template <std::size_t most>
 void solve_symmetric(std::array<std::array<double, most>, most> a, std::array<double, most>& b,
-           std::size_t n) noexcept {
+                     std::size_t n) noexcept {
   constexpr double kSingular = 1e-12;
   std::array<bool, most> dropped{};
   for (std::size_t i = 0; i < n; ++i) {

@@ -28,7 +28,7 @@ class FixedPointMixer {
  private:
   std::size_t steps_ = 0;  ///< steps in the history
   bool first_ = true;
-  std::vector<float> last_off_;   ///< g(x) - x of the latest call
+  std::vector<float> last_off_;  ///< g(x) - x of the latest call
   std::vector<float> last_image_;
   std::vector<std::vector<float>> off_steps_;    ///< differences of g(x) - x, in a ring
   std::vector<std::vector<float>> image_steps_;  ///< differences of g(x), in the same order

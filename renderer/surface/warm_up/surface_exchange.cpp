@@ -29,7 +29,7 @@ constexpr std::uint32_t kPlainIterations = 4;
 /// A list is taken anew when it has changed by more than this share of kExchangeResidual.
 constexpr double kRenewFrac = 0.5;
 
-/// What a pass over the record is for.
+/// A pass over the record has one of these purposes.
 enum class Pass : std::uint8_t {
   bounce,   ///< carries all samples once, with the radiation of the first guess
   courses,  ///< carries those that take a course from the pass before, once
@@ -424,7 +424,7 @@ SampleDrive Sweeper::drive(std::size_t s, const glm::vec3& normal, const Window&
   SampleDrive drive;
   const SampleHistories::Rows& rows = histories_.rows[s];
   drive.sun_frac = rows.sun_frac[j];
-  drive.take_part(in_.record.intervals[j].parts, sample);
+  drive.take_entity(in_.record.intervals[j].entities, sample);
   if (sample.body >= 0) drive.body_k = bodies_->mean_k(sample.body, j);
   if (!rows.hidden_sky.empty()) drive.hidden_sky_frac = rows.hidden_sky[j].frac;
   // Add what the seen samples send, scaled to the share of the hemisphere that they fill.

@@ -293,7 +293,7 @@ void PatchSampler::integrate(std::span<const NewSample> samples, StartMemo& memo
   const auto drive_of = [&record](const SurfacePatch& side, std::uint32_t index, std::size_t i) {
     SampleDrive drive;
     drive.sun_frac = side.sun_frac.row(index)[i];
-    drive.take_part(record.intervals[i].parts, side.samples[index]);
+    drive.take_entity(record.intervals[i].entities, side.samples[index]);
     if (side.hidden_sky.length() != 0) drive.hidden_sky_frac = side.hidden_sky.row(index)[i].frac;
     return drive;
   };

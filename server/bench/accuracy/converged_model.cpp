@@ -52,16 +52,19 @@ double equilibrium_k(const SurfaceForcing& f, const PointView& view,
       .temperature_k;
 }
 
-/// Computes physics.md eq. 16.
+/// Computes physics.md eq. 16. The film is that of the temperature `offset_k` at the start of the
+/// step.
 physics::FosterDrive<double> drive(const SurfaceForcing& f, const PointView& view,
-                                   const renderer::FosterMaterial& material) noexcept {
+                                   const renderer::FosterMaterial& material,
+                                   double offset_k) noexcept {
   const double around_frac = 1.0 - view.sky_frac;
   const double short_wave_w_m2 = direct_on_face_w_m2(f, view) + view.sky_frac * f.diffuse_w_m2 +
                                  around_frac * f.reflected_w_m2;
   const double long_wave_w_m2 = view.sky_frac * f.longwave_w_m2 + around_frac * f.environment_w_m2;
   return {.absorbed_w_m2 = material.solar_absorptance_frac * short_wave_w_m2 +
                            material.emissivity_frac * long_wave_w_m2,
-          .film_w_m2_k = f.film_w_m2_k,
+          .film_w_m2_k = physics::film_w_m2_k(f.film, view.normal, material.roughness,
+                                              physics::kReferenceK + offset_k - f.air_k),
           .air_offset_k = f.air_k - physics::kReferenceK};
 }
 
@@ -157,14 +160,16 @@ double ConvergedModel::foster_k(std::uint32_t index, std::span<const PointView> 
   const glm::dvec3& normal = view.front().normal;
   const PointView open{normal, 1.0, 0.5 * (1.0 + normal.z)};
   for (std::size_t i = 0; i < history_; ++i) {
-    physics::foster_step(x, drive(forcing_[i].begin, open, material),
-                         drive(forcing_[i].end, open, material), gains(index, i).ladder.level[0],
-                         surface);
+    const double offset_k = physics::foster_offset_k(x, surface);
+    physics::foster_step(x, drive(forcing_[i].begin, open, material, offset_k),
+                         drive(forcing_[i].end, open, material, offset_k),
+                         gains(index, i).ladder.level[0], surface);
   }
   for (std::size_t i = history_; i < forcing_.size(); ++i) {
     const std::size_t node = i - history_;
-    physics::foster_advance(x, drive(forcing_[i].begin, view[node], material),
-                            drive(forcing_[i].end, view[node + 1], material),
+    const double offset_k = physics::foster_offset_k(x, surface);
+    physics::foster_advance(x, drive(forcing_[i].begin, view[node], material, offset_k),
+                            drive(forcing_[i].end, view[node + 1], material, offset_k),
                             gains(index, i).ladder, surface, kToleranceK);
   }
   return physics::kReferenceK + physics::foster_offset_k(x, surface);

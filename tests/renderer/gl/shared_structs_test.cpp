@@ -73,7 +73,9 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, casters_sun_sine);
   EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, cascade_count);
   EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, flags);
-  EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, film_start_w_m2_k);
+  EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, film_start.upwind);
+  EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, film_end.stable_quarter);
+  EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, film_end.model_frac);
   EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, air_end_offset_k);
   EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, reflected_end_w_m2);
   EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, relaxation_offset);
@@ -90,7 +92,7 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
             static_cast<GLint>(2 * sizeof(gpu::BandParams) +
                                offsetof(gpu::BandParams, air_table_elevations)));
   // Check tables that shaders fetch as texels of four floats.
-  EXPECT_EQ(sizeof(gpu::MaterialParams), 3U * 16U);
+  EXPECT_EQ(sizeof(gpu::MaterialParams), 4U * 16U);
   EXPECT_EQ(offsetof(gpu::MaterialParams, initial_offset_k), 16U);
   EXPECT_EQ(offsetof(gpu::MaterialParams, base_offset_k), 28U);
   EXPECT_EQ(offsetof(gpu::MaterialParams, resistance_m2k_w), 32U);

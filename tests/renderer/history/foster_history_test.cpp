@@ -82,8 +82,10 @@ double looked_up_k(const FosterHistory& history, std::size_t m, glm::dvec3 n) {
   const auto surface = physics::foster_surface(material.network, material.emissivity_frac,
                                                material.base_k, kReferenceK);
   for (const IntervalForcing& interval : history.tail()) {
-    physics::foster_advance(state, unshadowed_drive(interval.begin, material, unit, kReferenceK),
-                            unshadowed_drive(interval.end, material, unit, kReferenceK),
+    const double offset_k = physics::foster_offset_k(state, surface);
+    physics::foster_advance(state,
+                            unshadowed_drive(interval.begin, material, unit, kReferenceK, offset_k),
+                            unshadowed_drive(interval.end, material, unit, kReferenceK, offset_k),
                             physics::foster_ladder(interval.dt_s, material.network), surface, 0.01);
   }
   return physics::foster_offset_k(state, surface);
@@ -120,7 +122,7 @@ double spun_up_k(const scene::ScenarioDesc& s, const Environment& environment,
     f.environment_w_m2 =
         physics::kStefanBoltzmannWPerM2K4 *
         std::pow(kReferenceK + physics::foster_offset_k(ground, surface_of(surroundings)), 4);
-    f.film_w_m2_k = weather.film_w_m2_k;
+    f.film = physics::air_film(physics::air_flow(weather));
     f.air_k = weather.air_k;
     return f;
   };
@@ -132,12 +134,16 @@ double spun_up_k(const scene::ScenarioDesc& s, const Environment& environment,
        t_ns < s.thermal.history_start_ns; t_ns += kStepNs) {
     SurfaceForcing to = forcing_at(t_ns + kStepNs);
     const glm::dvec3 up(0.0, 0.0, 1.0);
-    physics::foster_step(ground, unshadowed_drive(from, surroundings, up, kReferenceK),
-                         unshadowed_drive(to, surroundings, up, kReferenceK), ground_gains,
-                         surface_of(surroundings));
-    physics::foster_step(x, unshadowed_drive(from, material, n, kReferenceK),
-                         unshadowed_drive(to, material, n, kReferenceK), gains,
-                         surface_of(material));
+    const auto advance = [&](physics::FosterState<double>& states, const FosterMaterial& m,
+                             const glm::dvec3& normal, const auto& step_gains) {
+      const auto surface = surface_of(m);
+      const double offset_k = physics::foster_offset_k(states, surface);
+      physics::foster_step(states, unshadowed_drive(from, m, normal, kReferenceK, offset_k),
+                           unshadowed_drive(to, m, normal, kReferenceK, offset_k), step_gains,
+                           surface);
+    };
+    advance(ground, surroundings, up, ground_gains);
+    advance(x, material, n, gains);
     from = to;
   }
   return physics::foster_offset_k(x, surface_of(material));

@@ -162,7 +162,8 @@ TEST(Weather, RowsAreLinearBetweenAndConstantOutside) {
   EXPECT_DOUBLE_EQ(middle.cloud_frac, 0.25);
   // The row without its own values uses the models: air temperature and the wind.
   EXPECT_DOUBLE_EQ(middle.environment_k, 0.5 * (285.0 + 290.0));
-  EXPECT_DOUBLE_EQ(middle.film_w_m2_k, 0.5 * (7.0 + film_coefficient_w_m2_k(3.0)));
+  EXPECT_DOUBLE_EQ(middle.stated_film_w_m2_k, 3.5);
+  EXPECT_DOUBLE_EQ(middle.stated_film_frac, 0.5);
   EXPECT_DOUBLE_EQ(forcing_from_rows(rows, -5).air_k, 280.0);
   EXPECT_DOUBLE_EQ(forcing_from_rows(rows, 200).air_k, 290.0);
   EXPECT_DOUBLE_EQ(forcing_from_rows(rows, 999).air_k, 288.0);

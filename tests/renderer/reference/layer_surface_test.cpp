@@ -73,7 +73,8 @@ TEST(FaceState, AddsEveryTermOfTheBalance) {
   climate.diffuse_horizontal_w_m2 = 100.0;
   climate.longwave_down_w_m2 = 350.0;
   climate.air_k = 295.0;
-  climate.film_w_m2_k = 13.3;
+  climate.flow.stated_w_m2_k = 13.3;
+  climate.flow.stated_frac = 1.0;
   climate.surroundings_k = 310.0;
   const SurfaceOptics wall{kEast, 0.7, 0.9};
   ViewSample view{0, 0.25, 0.4, 0.1, 12.0, 45.0};
@@ -81,7 +82,7 @@ TEST(FaceState, AddsEveryTermOfTheBalance) {
   const double shortwave = 800.0 * 0.25 * 0.6 + 0.4 * 100.0 + 12.0 + 0.5 * 0.2 * 740.0;
   const double longwave = 0.4 * 350.0 + 45.0 + 0.5 * sigma_t4(310.0);
   EXPECT_NEAR(state.absorbed_w_m2, 0.7 * shortwave + 0.9 * longwave, 1e-9);
-  EXPECT_EQ(state.film_w_m2_k, 13.3);
+  EXPECT_EQ(state.film_at_w_m2_k(320.0), 13.3);
   EXPECT_EQ(state.air_k, 295.0);
   // The far side of the wall gets no direct sun.
   const FaceState back = face_state(climate, {-kEast, 0.7, 0.9}, view, 0.2);
@@ -131,7 +132,14 @@ TEST(PointSolver, ShadowActsFromItsEdgeOnAndNotBefore) {
   // and radiation.
   const ClimateNode then = climate.at(edge);
   const double jump = 0.9 * then.direct_normal_w_m2 * then.to_sun.z;
-  const double film = then.film_w_m2_k + 4.0 * 0.93 * sigma_t4(sun[1]) / sun[1];
+  const double roughness = scene::roughness_factor(scenario.materials[0].roughness);
+  // The half space sees the slope of the convective flux, whose film falls as the face cools.
+  const physics::AirFilm air = physics::air_film(then.flow);
+  const auto lost_w_m2 = [&](double k) {
+    return physics::film_w_m2_k(air, kUp, roughness, k - then.air_k) * (k - then.air_k);
+  };
+  const double convection_w_m2_k = (lost_w_m2(sun[1]) - lost_w_m2(shade[2])) / (sun[1] - shade[2]);
+  const double film = convection_w_m2_k + 4.0 * 0.93 * sigma_t4(sun[1]) / sun[1];
   const double x = film * std::sqrt(60.0 / (0.7 * 2120.0 * 920.0));
   const double drop = jump / film * (1.0 - std::exp(x * x) * std::erfc(x));
   EXPECT_NEAR((sun[2] - shade[2]) / drop, 1.0, 0.01);
@@ -194,7 +202,7 @@ TEST(SurfaceClimate, KeepsJumpsAndStatedSurroundingsOfTheWeather) {
   EXPECT_EQ(climate.at(6 * kHourNs).air_k, 300.0);
   EXPECT_EQ(climate.at(6 * kHourNs).surroundings_k, 305.0);
   EXPECT_EQ(climate.at(5 * kHourNs).surroundings_k, 280.0);
-  EXPECT_EQ(climate.at(5 * kHourNs).film_w_m2_k, 7.0);
+  EXPECT_EQ(physics::air_film(climate.at(5 * kHourNs).flow).stated_w_m2_k, 7.0);
   EXPECT_NEAR(climate.surroundings_reflectance_frac(), 0.1, 1e-12);
 }
 
@@ -232,17 +240,21 @@ TEST(PointSolver, SheetIsDrivenByBothOfItsFaces) {
   solver.run(-kUp, {down, up}, times, from_below);
   for (std::size_t i = 0; i < times.size(); ++i) {
     EXPECT_NEAR(from_above[i], from_below[i], 1e-4);
+    const double roughness = scene::roughness_factor(material.roughness);
     // Integrate the balance of both faces in steps of 0.1 s from an hour before.
     const auto net = [&](double now_s, double k) {
       const ClimateNode now = climate.at(static_cast<std::int64_t>(now_s * 1e9));
       const double rho = climate.surroundings_reflectance_frac();
       const ViewSample& lit = now_s < 9.0 * 3600.0 ? up[0] : up[2];
       const FaceState top = face_state(
-          now, {kUp, material.solar_absorptance_frac, material.emissivity_frac}, lit, rho);
+          now, {kUp, material.solar_absorptance_frac, material.emissivity_frac, roughness}, lit,
+          rho);
       const FaceState bottom = face_state(
-          now, {-kUp, material.solar_absorptance_frac, material.emissivity_frac}, down[0], rho);
+          now, {-kUp, material.solar_absorptance_frac, material.emissivity_frac, roughness},
+          down[0], rho);
       return top.absorbed_w_m2 + bottom.absorbed_w_m2 -
-             2.0 * material.emissivity_frac * sigma_t4(k) + 2.0 * now.film_w_m2_k * (now.air_k - k);
+             2.0 * material.emissivity_frac * sigma_t4(k) +
+             (top.film_at_w_m2_k(k) + bottom.film_at_w_m2_k(k)) * (now.air_k - k);
     };
     const double end_s = static_cast<double>(times[i]) * 1e-9;
     double t_k = 300.0;

@@ -41,6 +41,7 @@ scene::ScenarioDesc night(const scene::BodyInterior& interior) {
   const double sky_w_m2 = physics::kStefanBoltzmannWPerM2K4 * std::pow(kAirK, 4.0);
   s.weather = {weather(0.0, 0.0, sky_w_m2, kAirK)};
   s.weather[0].wind_m_s = 2.0;
+  s.weather[0].film_w_m2_k = 13.3;
   s.sensor.width_px = kWidth;
   s.sensor.height_px = kHeight;
   s.thermal.method = scene::ThermalMethod::cached;
@@ -83,7 +84,7 @@ double film_w_m2_k(const scene::ScenarioDesc& s) {
   const std::vector<std::int64_t> nodes_ns{0, kSecondNs};
   const auto intervals = renderer::surface_forcing(s, nodes_ns);
   EXPECT_TRUE(intervals.has_value());
-  return intervals ? intervals->front().begin.film_w_m2_k : 0.0;
+  return intervals ? intervals->front().begin.film.stated_w_m2_k : 0.0;
 }
 
 class BodyRun {

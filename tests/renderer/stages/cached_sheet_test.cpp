@@ -84,6 +84,12 @@ double balance_k(const scene::ScenarioDesc& s, std::int64_t end_ns) {
   EXPECT_TRUE(intervals.has_value());
   const scene::Material& m = s.materials[0];
   const double capacity = kSteel.thickness_m * kSteel.density_kg_m3 * kSteel.specific_heat_j_kg_k;
+  const auto both_films_w_m2_k = [&m](const renderer::SurfaceForcing& f, double k) {
+    const glm::dvec3 up(0.0, 0.0, 1.0);
+    const double roughness = scene::roughness_factor(m.roughness);
+    return physics::film_w_m2_k(f.film, up, roughness, k - f.air_k) +
+           physics::film_w_m2_k(f.film, -up, roughness, k - f.air_k);
+  };
   double t_k = 300.0;  // has no influence after the first of two hours
   for (const renderer::IntervalForcing& interval : *intervals) {
     for (int i = 0; i < 60; ++i) {
@@ -92,7 +98,7 @@ double balance_k(const scene::ScenarioDesc& s, std::int64_t end_ns) {
       const double longwave = f.longwave_w_m2 + f.environment_w_m2;
       const double out = 2.0 * physics::kStefanBoltzmannWPerM2K4 * std::pow(t_k, 4.0);
       t_k += (m.solar_absorptance_frac * shortwave + m.emissivity_frac * (longwave - out) +
-              2.0 * f.film_w_m2_k * (f.air_k - t_k)) /
+              both_films_w_m2_k(f, t_k) * (f.air_k - t_k)) /
              capacity;
     }
   }

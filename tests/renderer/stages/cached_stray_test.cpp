@@ -108,7 +108,8 @@ TEST(RendererStray, ACountryAroundTheSceneLeavesItsShadowsAlone) {
 }
 
 TEST(RendererStray, AnEntityShadesItselfWhereverItStands) {
-  // The entity is a deck with a wall on it. Beyond 20 km it sees its own hull alone.
+  // The entity is a deck with a wall on it. Beyond 20 km it sees its own hull alone. All places are
+  // at one height, because the air is colder higher up.
   auto deck = box({-0.3, -2.0, 0.0}, {0.3, 2.0, 1.5});
   deck.push_back(ground(3.0, 3.0));
   const auto seen_at = [&](const glm::dvec3& place_m) {
@@ -128,7 +129,7 @@ TEST(RendererStray, AnEntityShadesItselfWhereverItStands) {
   });
   ASSERT_GT(*high - *low, 5.0F);  // the shadow of the wall
   for (const glm::dvec3& place_m :
-       {glm::dvec3(40e3, 0.0, 1e3), glm::dvec3(4e5, 0.0, 1e3), glm::dvec3(-1e5, 8e5, 5e3)}) {
+       {glm::dvec3(40e3, 0.0, 1e3), glm::dvec3(4e5, 0.0, 1e3), glm::dvec3(-1e5, 8e5, 1e3)}) {
     const Difference off = difference(near_k, seen_at(place_m));
     RecordProperty("max_mk", static_cast<int>(1e3 * off.max_k));
     EXPECT_LT(off.max_k, 1e-3) << place_m.x;

@@ -70,10 +70,11 @@ double expected_k(const scene::ScenarioDesc& s, std::int64_t now_ns, const glm::
     for (renderer::IntervalForcing interval : intervals) {
       interval.begin.sun_w_m2 *= frac;
       interval.end.sun_w_m2 *= frac;
-      physics::foster_advance(x, unshadowed_drive(interval.begin, material, n, kReferenceK),
-                              unshadowed_drive(interval.end, material, n, kReferenceK),
-                              physics::foster_ladder(interval.dt_s, material.network), surface,
-                              s.thermal.tolerance_k);
+      const double offset_k = physics::foster_offset_k(x, surface);
+      physics::foster_advance(
+          x, unshadowed_drive(interval.begin, material, n, kReferenceK, offset_k),
+          unshadowed_drive(interval.end, material, n, kReferenceK, offset_k),
+          physics::foster_ladder(interval.dt_s, material.network), surface, s.thermal.tolerance_k);
     }
   };
   run(history.tail(), 1.0);

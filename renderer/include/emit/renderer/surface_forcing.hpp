@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "emit/physics/air_film.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/physics/foster.hpp"
 #include "emit/scene/scene_desc.hpp"
@@ -21,7 +22,8 @@ struct SurfaceForcing {
   double longwave_w_m2 = 0.0;     ///< long-wave flux of the sky on a level surface
   double reflected_w_m2 = 0.0;    ///< sunlight that the surroundings reflect
   double environment_w_m2 = 0.0;  ///< long-wave exitance of the surroundings
-  double film_w_m2_k = 0.0;       ///< film coefficient
+  physics::AirFlow flow;          ///< air past what stands still
+  physics::AirFilm film;          ///< film of scenery in that flow
   double air_k = 0.0;             ///< air temperature
 };
 /// Forcing over an interval. It goes linearly from begin to end.
@@ -47,8 +49,9 @@ struct FosterMaterial {
   double base_k = 0.0;
   double initial_k = 0.0;
   double prescribed_k = 0.0;
-  bool sheet = false;  ///< driven by the mean of the fluxes that its two faces receive
-  bool body = false;   ///< the base is the interior of a body, which starts at base_k
+  double roughness = 1.0;  ///< factor of the forced part of the film (physics.md eq. 34)
+  bool sheet = false;      ///< driven by the mean of the fluxes that its two faces receive
+  bool body = false;       ///< the base is the interior of a body, which starts at base_k
   physics::FosterState<double> base_shares{};  ///< shares c_i of the modes in a change of the base
 
   [[nodiscard]] bool prescribed() const noexcept { return network.count == 0; }

@@ -36,12 +36,21 @@ struct BalanceFace {
     const auto mix = [frac](double a, double b) { return a + frac * (b - a); };
     const FaceState& a = segment.start;
     const FaceState& b = segment.end;
-    const double film = mix(a.film_w_m2_k, b.film_w_m2_k);
+    const auto convection_w_m2 = [&](double k) {
+      return mix(a.film_at_w_m2_k(k), b.film_at_w_m2_k(k)) * (mix(a.air_k, b.air_k) - k);
+    };
+    // Take the slope of a film that follows the temperature by differences.
+    constexpr double kDifferenceK = 0.01;
+    const double slope_w_m2_k =
+        a.film || b.film
+            ? (convection_w_m2(face_k + kDifferenceK) - convection_w_m2(face_k - kDifferenceK)) /
+                  (2.0 * kDifferenceK)
+            : -mix(a.film_w_m2_k, b.film_w_m2_k);
     // Keep the emission odd in T, so that a trial value below 0 K pushes the iteration back up.
     const double cube = std::abs(face_k) * face_k * face_k;
-    return {mix(a.absorbed_w_m2, b.absorbed_w_m2) + film * (mix(a.air_k, b.air_k) - face_k) -
+    return {mix(a.absorbed_w_m2, b.absorbed_w_m2) + convection_w_m2(face_k) -
                 emission_w_m2_k4 * cube * face_k,
-            -film - 4.0 * emission_w_m2_k4 * cube};
+            std::min(slope_w_m2_k, 0.0) - 4.0 * emission_w_m2_k4 * cube};
   }
 };
 
@@ -493,9 +502,13 @@ void face_history(LayerSolver& solver, std::span<const ProfilePoint> profile,
         const auto at = [&](double time_s) {
           const double f = (time_s - a.time_s) / (b.time_s - a.time_s);
           const auto mix = [f](double x, double y) { return x + f * (y - x); };
+          std::optional<FaceFilm> film = a.face.film;
+          if (film && b.face.film) {
+            film->air = physics::between_films(a.face.film->air, b.face.film->air, f);
+          }
           return FaceState{mix(a.face.absorbed_w_m2, b.face.absorbed_w_m2),
                            mix(a.face.film_w_m2_k, b.face.film_w_m2_k),
-                           mix(a.face.air_k, b.face.air_k)};
+                           mix(a.face.air_k, b.face.air_k), film};
         };
         segment.start = now_s == a.time_s ? a.face : at(now_s);
         segment.end = segment.end_s == b.time_s ? b.face : at(segment.end_s);

@@ -17,7 +17,7 @@ ClimateNode mix(const ClimateNode& a, const ClimateNode& b, double f) noexcept {
           at(a.diffuse_horizontal_w_m2, b.diffuse_horizontal_w_m2),
           at(a.longwave_down_w_m2, b.longwave_down_w_m2),
           at(a.air_k, b.air_k),
-          at(a.film_w_m2_k, b.film_w_m2_k),
+          physics::between_flows(a.flow, b.flow, f),
           at(a.surroundings_k, b.surroundings_k)};
 }
 
@@ -131,8 +131,8 @@ void PointSolver::run(const glm::dvec3& normal, const Views& views,
     std::fill(out_k.begin(), out_k.end(), *material_->prescribed_k);
     return;
   }
-  const SurfaceOptics surface{normal, material_->solar_absorptance_frac,
-                              material_->emissivity_frac};
+  const SurfaceOptics surface{normal, material_->solar_absorptance_frac, material_->emissivity_frac,
+                              scene::roughness_factor(material_->roughness), material_->sheet};
   // Repeat the spin-up only for another orientation.
   if (!has_spin_up_ || normal != spin_up_normal_) spin_up(surface);
   const std::int64_t start_ns = climate_->history_start_ns();

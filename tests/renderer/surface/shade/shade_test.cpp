@@ -243,7 +243,7 @@ TEST_F(ShadeTest, TheStepResponseIsThatOfTheModelsOwnSteps) {
   constexpr double kAroundK = 300.0;
   const double exitance = physics::kStefanBoltzmannWPerM2K4 * std::pow(kAroundK, 4.0);
   forcing.longwave_w_m2 = forcing.environment_w_m2 = exitance;
-  forcing.film_w_m2_k = 12.0;
+  forcing.film = physics::stated_film(12.0);
   forcing.air_k = kAroundK;
   constexpr double kSunWM2 = 20.0;
   forcing.sun_w_m2 = {0.0, 0.0, kSunWM2};

@@ -62,9 +62,8 @@ class ClosedBox {
     }
     for (glm::vec3& normal : box.normals) normal = -normal;
     constexpr std::uint32_t kFloorBegin = 24;  // the fifth of six faces of two triangles each
-    box.submeshes = {{0, kFloorBegin, 1, false},
-                     {kFloorBegin, 6, 0, false},
-                     {kFloorBegin + 6, 6, 1, false}};
+    box.submeshes = {
+        {0, kFloorBegin, 1, false}, {kFloorBegin, 6, 0, false}, {kFloorBegin + 6, 6, 1, false}};
     scene_.add_static(std::move(box));
     scene_.geometry.materials = scenario_.materials;
     scene_.geometry.instances[0].world_bounds = scene_.geometry.meshes[0].bounds;
@@ -76,9 +75,9 @@ class ClosedBox {
     environment_.emplace(scenario_);
     auto networks = build_foster_materials(scenario_, scene_.geometry.materials);
     ASSERT_TRUE(networks.has_value()) << networks.error().text;
-    auto surface = CachedSurface::create(
-        scenario_, scene_.geometry, {-1},
-        std::span(*networks).first(networks->size() - 1), kReferenceK);
+    auto surface =
+        CachedSurface::create(scenario_, scene_.geometry, {-1},
+                              std::span(*networks).first(networks->size() - 1), kReferenceK);
     ASSERT_TRUE(surface.has_value()) << surface.error().text;
     surface_ = std::move(*surface);
     history_.emplace(scenario_.thermal.steps,

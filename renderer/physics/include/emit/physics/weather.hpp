@@ -22,6 +22,9 @@ struct WeatherSample {
   double cloud_frac = 0.0;              ///< beta of physics.md eq. 1, 0..1; 0 for measured sun
   std::optional<double> environment_k;  ///< surroundings; if absent, the air temperature
   std::optional<double> film_w_m2_k;    ///< if absent, from the wind; not used by emit2014
+  /// Direction from which the wind blows, clockwise from north. If absent, all directions count
+  /// alike.
+  std::optional<double> wind_from_rad = std::nullopt;
 };
 
 /// Parameters of the clear-sky models.
@@ -32,6 +35,7 @@ struct ClearSky {
   double dew_point_k = 282.0;
   double wind_m_s = 2.0;
   double cloud_frac = 0.0;
+  std::optional<double> wind_from_rad;  ///< see WeatherSample
 };
 
 /// Inputs of physics.md eq. 1 that do not depend on the surface.
@@ -42,14 +46,22 @@ struct Forcing {
   double air_k = 0.0;
   double environment_k = 0.0;
   bool environment_stated = false;  ///< false: environment_k is the air temperature
-  double film_w_m2_k = 0.0;
+  /// Film coefficient that the weather states, multiplied by its share, and that share: between a
+  /// row that states it and one that does not, the share goes from 1 to 0.
+  double stated_film_w_m2_k = 0.0;
+  double stated_film_frac = 0.0;
   double wind_m_s = 0.0;
+  /// Direction to which the wind blows. It is a unit vector at rows, shorter between rows of
+  /// different directions, and 0 if it is not known.
+  double wind_to_east = 0.0;
+  double wind_to_north = 0.0;
+  double height_m = 0.0;  ///< of the place; the caller sets it
   double cloud_frac = 0.0;
 };
 
 /// Returns the forcing at a time: linear between rows, constant before the first and after the
 /// last. Two rows with the same time make a jump, and the later row holds from that instant on. If
-/// only one of two neighbours states an optional value, the other one takes it from its model.
+/// only one of two neighbours states `environment_k`, the other one takes it from its model.
 /// @pre rows is not empty and ascending in time.
 [[nodiscard]] Forcing forcing_from_rows(std::span<const WeatherSample> rows,
                                         std::int64_t sim_time_ns) noexcept;

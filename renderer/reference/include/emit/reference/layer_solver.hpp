@@ -2,19 +2,43 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <glm/ext/vector_double3.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "emit/physics/air_film.hpp"
 #include "emit/reference/layer_mesh.hpp"
 
 namespace emit::reference {
+
+/// Film of a face that depends on its temperature, or the mean over both faces of a sheet.
+struct FaceFilm {
+  physics::AirFilm air;
+  glm::dvec3 normal{0.0, 0.0, 1.0};
+  double roughness = 1.0;
+  bool both_sides = false;  ///< the mean of this normal and the opposite one
+
+  /// Returns the film coefficient of a face that much warmer than the air.
+  [[nodiscard]] double at_w_m2_k(double excess_k) const noexcept {
+    const double front = physics::film_w_m2_k(air, normal, roughness, excess_k);
+    return both_sides ? 0.5 * (front + physics::film_w_m2_k(air, -normal, roughness, excess_k))
+                      : front;
+  }
+};
 
 /// Values that act on the face at an instant. The flux into the solid is q = absorbed + film (air -
 /// T) - emissivity sigma T^4, W/m2.
 struct FaceState {
   double absorbed_w_m2 = 0.0;
-  double film_w_m2_k = 0.0;
+  double film_w_m2_k = 0.0;  ///< counts if `film` is absent
   double air_k = 0.0;
+  std::optional<FaceFilm> film = std::nullopt;
+
+  /// Returns the film coefficient at a temperature of the face.
+  [[nodiscard]] double film_at_w_m2_k(double face_k) const noexcept {
+    return film ? film->at_w_m2_k(face_k - air_k) : film_w_m2_k;
+  }
 };
 
 /// Stretch of time over which each value of the face is linear.

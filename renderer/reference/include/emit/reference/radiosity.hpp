@@ -23,7 +23,8 @@ struct ExchangeFace {
   double area_m2 = 0.0;
   double solar_absorptance_frac = 0.0;
   double emissivity_frac = 0.0;
-  bool enclosed = false;  ///< the face looks into a closed cavity: it gets no rays and no sky
+  double roughness = 1.0;  ///< factor of the forced part of the film
+  bool enclosed = false;   ///< the face looks into a closed cavity: it gets no rays and no sky
 };
 
 /// Irradiance of a face apart from direct sun, W/m2.

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "emit/physics/air_film.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/reference/layer_solver.hpp"
 #include "emit/scene/scene_desc.hpp"
@@ -17,6 +18,7 @@
 ///   q = a_s [DNI f_sun max(0, N.L) + f_sky E_dif + G_scene + f_ground rho GHI]
 ///       + eps [f_sky L_down + L_scene + f_ground sigma T_env^4] - eps sigma T^4 + h (T_air - T)
 ///
+/// h is that of physics.md eq. 34 at the face's temperature T.
 /// GHI = DNI sin(elevation) + E_dif. f_ground = 1 - f_sky - f_scene is the share that lies below
 /// the horizon or is not part of the scene: surroundings of temperature T_env and short-wave
 /// reflectance rho. See physics.md eq. 16.
@@ -30,7 +32,7 @@ struct ClimateNode {
   double diffuse_horizontal_w_m2 = 0.0;
   double longwave_down_w_m2 = 0.0;
   double air_k = 0.0;
-  double film_w_m2_k = 0.0;
+  physics::AirFlow flow = {};  ///< past what stands still
   double surroundings_k = 0.0;
 };
 
@@ -89,6 +91,8 @@ struct SurfaceOptics {
   glm::dvec3 normal{0.0, 0.0, 1.0};
   double solar_absorptance_frac = 0.0;
   double emissivity_frac = 0.0;
+  double roughness = 1.0;   ///< factor of the forced part of the film
+  bool both_sides = false;  ///< the film is the mean of both faces of a sheet
 };
 
 /// Returns the terms of the balance that do not depend on the surface temperature. RT-safe.

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "emit/physics/air_film.hpp"
 #include "emit/physics/atmosphere_table.hpp"
 #include "emit/physics/frames.hpp"
 #include "emit/physics/weather.hpp"
@@ -82,14 +83,30 @@ struct BodyInterior {
   [[nodiscard]] bool operator==(const BodyInterior&) const = default;
 };
 
+/// Roughness of a surface by classes of DOE-2 and TARP.
+enum class Roughness : std::uint8_t {
+  very_rough,     ///< gravel, crops, tree crowns
+  rough,          ///< brick, rough plaster, grass
+  medium_rough,   ///< concrete, asphalt
+  medium_smooth,  ///< sawn wood, fabric
+  smooth,         ///< smooth plaster, painted metal
+  very_smooth,    ///< glass, polished metal, water
+};
+/// Returns the factor R of physics.md eq. 34.
+[[nodiscard]] constexpr double roughness_factor(Roughness roughness) noexcept {
+  constexpr std::array<double, 6> kFactors{2.17, 1.67, 1.52, 1.13, 1.11, 1.0};
+  return kFactors[static_cast<std::size_t>(roughness)];
+}
+
 /// Thermal and optical properties of a surface and of the body under it.
 struct Material {
   std::string name;
-  double solar_absorptance_frac = 0.0;          ///< absorbed share of sunlight: 1 - albedo
-  double emissivity_frac = 0.0;                 ///< total hemispherical, long-wave
-  std::vector<BandEmissivity> band_emissivity;  ///< bands not listed use emissivity_frac
-  std::vector<Layer> layers;                    ///< outermost first; emit2014 uses the first only
-  BaseKind base = BaseKind::room;               ///< what the last layer rests on
+  double solar_absorptance_frac = 0.0;            ///< absorbed share of sunlight: 1 - albedo
+  double emissivity_frac = 0.0;                   ///< total hemispherical, long-wave
+  Roughness roughness = Roughness::medium_rough;  ///< as the wind feels it; emit2014 ignores it
+  std::vector<BandEmissivity> band_emissivity;    ///< bands not listed use emissivity_frac
+  std::vector<Layer> layers;                      ///< outermost first; emit2014 uses the first only
+  BaseKind base = BaseKind::room;                 ///< what the last layer rests on
   /// Temperature under the last layer. resolve_bases() fills it unless the user states it.
   double base_k = 0.0;
   bool base_stated = false;  ///< base_k is the user's own number
@@ -184,7 +201,9 @@ struct ObjectDesc {
   Trajectory trajectory;  ///< entities only; empty: stays at its placement until the host moves it
   bool on = true;         ///< entities only: on state without a trajectory
   std::vector<PartDesc> parts;  ///< entities only: what heats itself
-  BodyInterior interior;        ///< interior that faces of a material with base `body` share
+  /// Shape and length that set the film of an entity; a length of 0 is that of its geometry.
+  physics::AirFilmBody air_film{.length_m = 0.0};
+  BodyInterior interior;  ///< interior that faces of a material with base `body` share
 };
 
 /// Joint between two bodies that touch. Bodies that no contact names conduct to each other as if

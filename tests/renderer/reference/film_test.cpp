@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// Judges the real-time model, whose film follows the temperature of the step before, against the
+// layer solver, which has it at the temperature of now.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "emit/physics/constants.hpp"
+#include "emit/reference/surface_forcing.hpp"
+#include "emit/renderer/surface_forcing.hpp"
+#include "history/foster_history.hpp"
+
+namespace {
+
+using namespace emit;
+
+constexpr std::int64_t kMinuteNs = 60'000'000'000;
+
+/// Returns a clear midsummer day with little wind, in which the film changes most. The body has one
+/// layer, and its four modes come from the layer, so that both models have the same conduction to a
+/// few hundredths of a kelvin.
+scene::ScenarioDesc calm_day(double wind_m_s) {
+  scene::ScenarioDesc s;
+  s.place = {48.56 * physics::kDegree, 11.26 * physics::kDegree, 400.0};
+  s.epoch_utc_ns = 1'782'000'000'000'000'000;
+  s.clear_sky.wind_m_s = wind_m_s;
+  s.clear_sky.wind_from_rad = 1.0;
+  scene::Material board;
+  board.name = "board";
+  board.solar_absorptance_frac = 0.8;
+  board.emissivity_frac = 0.9;
+  board.roughness = scene::Roughness::rough;
+  board.layers = {{0.02, 0.2, 900.0, 1500.0}};
+  board.base_k = 290.0;
+  s.materials = {board};
+  s.default_material = "board";
+  s.thermal.model = scene::ThermalModel::foster;
+  s.thermal.initial_k = 290.0;
+  s.thermal.foster_modes = 4;
+  return s;
+}
+
+TEST(Film, OfTheStepBeforeIsThatOfNow) {
+  double worst_rms_k = 0.0;
+  for (const double wind_m_s : {0.0, 1.0, 4.0}) {
+    const scene::ScenarioDesc s = calm_day(wind_m_s);
+    std::vector<std::int64_t> nodes_ns;
+    constexpr std::int64_t kStepNs = 5 * kMinuteNs;
+    for (std::int64_t t = 0; t <= 24 * 60 * kMinuteNs; t += kStepNs) nodes_ns.push_back(t);
+    reference::ClimateOptions options;
+    options.end_ns = nodes_ns.back();
+    auto climate = reference::SurfaceClimate::create(s, options);
+    ASSERT_TRUE(climate.has_value());
+    const auto forcing = renderer::surface_forcing(s, nodes_ns);
+    ASSERT_TRUE(forcing.has_value());
+    const auto materials = renderer::foster_materials(s.materials, s.thermal);
+    ASSERT_TRUE(materials.has_value());
+    const renderer::FosterMaterial& material = materials->front();
+    for (const glm::dvec3& normal :
+         {glm::dvec3(0.0, 0.0, 1.0), glm::dvec3(0.0, -1.0, 0.0), glm::dvec3(0.0, 0.0, -1.0)}) {
+      const auto truth =
+          reference::point_history(*climate, s.materials[0], 290.0, normal, {}, nodes_ns);
+      ASSERT_TRUE(truth.has_value());
+      const auto surface = physics::foster_surface(material.network, material.emissivity_frac,
+                                                   material.base_k, physics::kReferenceK);
+      physics::FosterState<double> x{};
+      const auto ladder = physics::foster_ladder(300.0, material.network);
+      double squares = 0.0;
+      double worst_k = 0.0;
+      for (std::size_t i = 0; i < forcing->size(); ++i) {
+        const double offset_k = physics::foster_offset_k(x, surface);
+        const auto drive = [&](const renderer::SurfaceForcing& f) {
+          return renderer::unshadowed_drive(f, material, normal, physics::kReferenceK, offset_k);
+        };
+        physics::foster_advance(x, drive((*forcing)[i].begin), drive((*forcing)[i].end), ladder,
+                                surface, 0.01);
+        const double off_k =
+            physics::kReferenceK + physics::foster_offset_k(x, surface) - (*truth)[i + 1];
+        squares += off_k * off_k / static_cast<double>(forcing->size());
+        worst_k = std::max(worst_k, std::abs(off_k));
+      }
+      worst_rms_k = std::max(worst_rms_k, std::sqrt(squares));
+      EXPECT_LT(std::sqrt(squares), 0.1) << wind_m_s << " m/s, up " << normal.z;
+      EXPECT_LT(worst_k, 0.5) << wind_m_s << " m/s, up " << normal.z;
+    }
+  }
+  RecordProperty("worst_rms_mk", static_cast<int>(1e3 * worst_rms_k));
+}
+
+TEST(Film, OfACalmNightIsNotThatOfTheWind) {
+  // A cold roof under a clear sky cools far below calm air. Stable air hardly exchanges heat with
+  // it.
+  const std::vector<std::int64_t> times_ns{2 * 60 * kMinuteNs};
+  double off_k[2] = {};
+  for (const bool windy : {false, true}) {
+    const scene::ScenarioDesc s = calm_day(windy ? 8.0 : 0.0);
+    reference::ClimateOptions options;
+    options.end_ns = times_ns[0];
+    auto climate = reference::SurfaceClimate::create(s, options);
+    ASSERT_TRUE(climate.has_value());
+    scene::Material foam = s.materials[0];
+    foam.layers = {{0.1, 0.03, 30.0, 1400.0}};
+    const auto k = reference::point_history(*climate, foam, 290.0, {0.0, 0.0, 1.0}, {}, times_ns);
+    ASSERT_TRUE(k.has_value());
+    off_k[windy ? 1 : 0] = (*k)[0] - climate->at(times_ns[0]).air_k;
+  }
+  EXPECT_LT(off_k[0], -10.0);
+  EXPECT_GT(off_k[1], -4.0);
+}
+
+}  // namespace
