@@ -206,7 +206,6 @@ physics::Result<std::vector<FosterMaterial>> foster_materials(
     }
     entry.body = material.rests_on_body();
     if (entry.body) entry.base_shares = physics::base_shares(layers, entry.network);
-    entry.layers = std::move(layers);
     out.push_back(entry);
   }
   return out;

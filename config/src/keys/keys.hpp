@@ -63,9 +63,7 @@ struct WeatherDraft {
 };
 struct AtmosphereDraft {
   bool enabled = true;
-  std::string model = "auto";
-  double visibility_km = 23.0;
-  std::optional<double> water_ratio;
+  std::string model = "midlatitude_summer";
   std::filesystem::path file;
   std::vector<scene::BandAtmosphere> bands;
 };

@@ -317,26 +317,15 @@ const KeyTable<AtmosphereDraft>& atmosphere_keys() {
       choice<AtmosphereDraft>(
           "model",
           std::vector<std::pair<std::string, std::string>>{
-              {"auto", "auto"},
-              {"tropical", "tropical"},
               {"midlatitude_summer", "midlatitude_summer"},
+              {"midlatitude_summer_hazy", "midlatitude_summer_hazy"},
               {"midlatitude_winter", "midlatitude_winter"},
-              {"subarctic_summer", "subarctic_summer"},
-              {"subarctic_winter", "subarctic_winter"},
+              {"tropical", "tropical"},
               {"us_standard", "us_standard"},
               {"none", "none"}},
           EMIT_FIELD(model),
-          "Air of the built-in bands: a model atmosphere with rural haze, fitted to LOWTRAN7. "
-          "`auto` "
-          "takes the climate of latitude and date. The ground's air temperature is that of the "
-          "weather. With `none` only `file` and `[[atmosphere.band]]` count."),
-      number<AtmosphereDraft>("visibility_km", "km", between(2, 50), EMIT_FIELD(visibility_km),
-                              "Visibility in the haze of the built-in air."),
-      number<AtmosphereDraft>(
-          "water_ratio", "", between(0, 5), EMIT_FIELD(water_ratio),
-          "Water vapour of the built-in air by that of its climate. Not stated: "
-          "from the dew point of a clear sky, or with a weather table from its "
-          "mean air temperature at the climate's humidity."),
+          "Terms of the built-in bands: fits to LOWTRAN7 with rural haze and 23 km visibility "
+          "(`hazy`: 5 km). With `none` only `file` and `[[atmosphere.band]]` count."),
       path<AtmosphereDraft>("file", EMIT_FIELD(file),
                             "CSV file of the air (see Atmosphere tables). It comes before the "
                             "model. Bands that a grid lacks need `model` written out."),

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <glm/geometric.hpp>
 
 #include "emit/physics/constants.hpp"
@@ -15,48 +14,30 @@ using physics::FosterDrive;
 using physics::FosterState;
 using physics::FosterSurface;
 
-/// Returns the exitance of a black surface.
-double exitance_w_m2(double temperature_k) noexcept {
-  const double t2 = temperature_k * temperature_k;
-  return physics::kStefanBoltzmannWPerM2K4 * t2 * t2;
-}
-
-/// Lets states decay without any flux (physics.md eq. 6).
-void relax(FosterState<double>& x, const physics::FosterGains<double>& gains) noexcept {
-  for (std::size_t i = 0; i < physics::kMaxFosterModes; ++i) {
-    x[i] -= x[i] * (gains.start_frac[i] + gains.end_frac[i]);
-  }
-}
+/// Weights of modes that take the whole flux.
+constexpr std::array<float, physics::kMaxFosterModes> kWhole{1.0F, 1.0F, 1.0F, 1.0F};
 
 /// Adds all modes, in a fixed order.
 double sum(const FosterState<double>& x) noexcept {
   return (x[0] + x[1]) + (x[2] + x[3]);
 }
 
-/// Returns the product of a matrix and a vector.
-FosterState<double> product(const physics::ColumnModes::Matrix& a,
-                            const FosterState<double>& x) noexcept {
-  FosterState<double> out{};
-  for (std::size_t l = 0; l < physics::kMaxFosterModes; ++l) {
-    out[l] = (a[l][0] * x[0] + a[l][1] * x[1]) + (a[l][2] * x[2] + a[l][3] * x[3]);
-  }
-  return out;
+/// Returns the exitance of a black surface.
+double exitance_w_m2(double temperature_k) noexcept {
+  const double t2 = temperature_k * temperature_k;
+  return physics::kStefanBoltzmannWPerM2K4 * t2 * t2;
 }
 
-/// Returns true if a column has the modes of a network, in the same order.
-bool same_modes(const physics::FosterNetwork& network, const physics::ConductionColumn& column) {
-  const physics::FosterNetwork found = physics::modes_of_column(column).network;
-  if (found.count != network.count) return false;
-  constexpr double kSame = 1e-6;
-  for (std::size_t i = 0; i < found.count; ++i) {
-    const physics::NetworkMode& a = found.modes[i];
-    const physics::NetworkMode& b = network.modes[i];
-    if (std::abs(a.tau_s - b.tau_s) > kSame * b.tau_s ||
-        std::abs(a.resistance_m2k_w - b.resistance_m2k_w) > kSame * b.resistance_m2k_w) {
-      return false;
-    }
+/// Advances states under a flux that goes linearly from `begin` to `end`. The result is exact
+/// (physics.md eq. 6). Mode i takes the share `weight_frac[i]` of the flux.
+void relax(FosterState<double>& x, const FosterSurface<double>& surface,
+           const std::array<float, physics::kMaxFosterModes>& weight_frac, double begin_w_m2,
+           double end_w_m2, const physics::FosterGains<double>& gains) noexcept {
+  for (std::size_t i = 0; i < physics::kMaxFosterModes; ++i) {
+    const double r = surface.resistance_m2k_w[i] * weight_frac[i];
+    x[i] +=
+        (r * begin_w_m2 - x[i]) * gains.start_frac[i] + (r * end_w_m2 - x[i]) * gains.end_frac[i];
   }
-  return true;
 }
 
 }  // namespace
@@ -66,46 +47,16 @@ FosterHeat::FosterHeat(std::span<const FosterMaterial> materials, double referen
     : materials_(materials.begin(), materials.end()),
       reference_k_(reference_k),
       tolerance_k_(tolerance_k) {
-  // Keep to one dimension what has no column with the same modes, as where two of them coincide.
-  for (FosterMaterial& material : materials_) {
-    if (!same_modes(material.network, physics::column_of_network(material.network))) {
-      material.layers.clear();
-    }
-  }
-  for (std::uint32_t cut = 0; cut <= kColumnCuts; ++cut) {
-    for (const FosterMaterial& material : materials_) {
-      Stack stack;
-      stack.network = material.network;
-      stack.base_shares = material.base_shares;
-      if (!material.layers.empty()) {
-        stack.column = physics::column_of_network(material.network);
-        if (cut != 0) {
-          double depth_m = 0.0;
-          for (const physics::StackLayer& layer : material.layers) depth_m += layer.thickness_m;
-          stack.column =
-              physics::cut_column(material.layers, stack.column, cut_frac(cut) * depth_m);
-        }
-        stack.depths = physics::depths_of_column(material.layers, stack.column);
-        stack.modes = physics::modes_of_column(stack.column);
-        if (cut != 0) {
-          stack.network = stack.modes.network;
-          stack.base_shares = stack.modes.base_shares;
-        }
-      }
-      stack.surface = physics::foster_surface(stack.network, material.emissivity_frac,
-                                              material.base_k, reference_k);
-      stacks_.push_back(stack);
-    }
+  for (const FosterMaterial& material : materials_) {
+    surfaces_.push_back(physics::foster_surface(material.network, material.emissivity_frac,
+                                                material.base_k, reference_k));
   }
 }
 
 void FosterHeat::prepare(HeatInterval& interval) const noexcept {
-  for (std::size_t i = 0; i < stacks_.size(); ++i) {
-    const FosterMaterial& material = materials_[i % materials_.size()];
-    const bool whole = i < materials_.size();
-    if (material.prescribed() || (!whole && material.layers.empty())) continue;
-    interval.ladders[i] = physics::foster_ladder(interval.forcing.dt_s, stacks_[i].network);
-    if (!material.layers.empty()) interval.sides[i] = side_response(i, interval.ladders[i]);
+  for (std::size_t m = 0; m < materials_.size(); ++m) {
+    if (materials_[m].prescribed()) continue;
+    interval.ladders[m] = physics::foster_ladder(interval.forcing.dt_s, materials_[m].network);
   }
 }
 
@@ -202,8 +153,9 @@ FosterDrive<double> FosterHeat::absorbed(std::uint32_t material, const FilmDrive
   return drive;
 }
 
-SampleOutput FosterHeat::output_of(const SurfaceSample& sample, const Incoming& in,
-                                   const SampleDrive& drive, double offset_k) const noexcept {
+SampleOutput FosterHeat::output_of(const SurfaceSample& sample, const FilmDrive& film,
+                                   const Incoming& in, const SampleDrive& drive,
+                                   const PartHeat& part, double offset_k) const noexcept {
   const FosterMaterial& m = materials_[sample.material];
   SampleOutput out;
   out.offset_k = static_cast<float>(offset_k);
@@ -213,171 +165,34 @@ SampleOutput FosterHeat::output_of(const SurfaceSample& sample, const Incoming& 
       static_cast<float>(m.emissivity_frac * exitance_w_m2(reference_k_ + offset_k) +
                          (1.0 - m.emissivity_frac) * in.longwave_w_m2);
   out.shortwave_out_w_m2 = static_cast<float>((1.0 - m.solar_absorptance_frac) * in.shortwave_w_m2);
-  return out;
-}
-
-double FosterHeat::offset_k(const SurfaceSample& sample, const SampleState& state) const noexcept {
-  const FosterMaterial& material = materials_[sample.material];
-  if (material.prescribed()) return material.prescribed_k - reference_k_;
-  return physics::foster_offset_k(state.modes_k, stacks_[stack_of(sample)].surface);
-}
-
-void FosterHeat::cut(const SurfaceSample& sample, SampleState& state) const noexcept {
-  if (sample.cut == 0) return;
-  const FosterState<double> lumps_k =
-      product(stacks_[sample.material].modes.lump_from_mode, state.modes_k);
-  state.modes_k = product(stacks_[stack_of(sample)].modes.mode_from_lump, lumps_k);
-}
-
-FosterState<double> FosterHeat::lumps_k(const SurfaceSample& sample, const SampleState& state,
-                                        double body_k) const noexcept {
-  const Stack& stack = stacks_[stack_of(sample)];
-  FosterState<double> modes_k = state.modes_k;
-  double base_k = stack.surface.base_offset_k;
-  if (sample.body >= 0) {
-    const double warmer_k = body_k - base_k;
-    for (std::size_t i = 0; i < modes_k.size(); ++i) modes_k[i] -= stack.base_shares[i] * warmer_k;
-    base_k = body_k;
-  }
-  FosterState<double> out = product(stack.modes.lump_from_mode, modes_k);
-  for (double& lump_k : out) lump_k += base_k;
-  return out;
-}
-
-SideHeat FosterHeat::side_heat(const SurfaceSamples& all, const SurfaceSample& sample,
-                               const SampleState& own, std::span<const SampleState> states,
-                               double body_k) const noexcept {
-  SideHeat side;
-  for (std::uint32_t k = 0; k < sample.link_count; ++k) {
-    const SideLink& link = all.links[sample.first_link + k];
-    const FosterState<double> other_k =
-        lumps_k(all.samples[link.sample], states[link.sample], body_k);
-    for (std::size_t l = 0; l < other_k.size(); ++l) {
-      side.conductance_w_m2_k[l] += link.conductance_w_m2_k[l];
-      side.mean_k[l] += link.conductance_w_m2_k[l] * other_k[l];
-    }
-  }
-  // Neighbours move towards the sample while it moves towards them, so that they meet half way:
-  // twice the conductance leads to the middle between both. Closely coupled samples would take each
-  // other's temperature in turn without it.
-  const FosterState<double> own_k = lumps_k(sample, own, body_k);
-  for (std::size_t l = 0; l < side.mean_k.size(); ++l) {
-    if (!(side.conductance_w_m2_k[l] > 0.0)) continue;
-    side.mean_k[l] = 0.5 * (own_k[l] + side.mean_k[l] / side.conductance_w_m2_k[l]);
-    side.conductance_w_m2_k[l] *= 2.0;
-  }
-  return side;
-}
-
-SideResponse FosterHeat::side_response(std::size_t index,
-                                       const physics::FosterLadder& ladder) const noexcept {
-  const Stack& stack = stacks_[index];
-  const physics::FosterGains<double>& gains = ladder.level[0];
-  SideResponse out;
-  for (std::size_t i = 0; i < stack.network.count; ++i) {
-    const physics::NetworkMode& mode = stack.network.modes[i];
-    // A steady flux into lump m drives mode i by its share of that lump.
-    const double steady_s = mode.tau_s * (gains.start_frac[i] + gains.end_frac[i]);
-    for (std::size_t l = 0; l < stack.column.count; ++l) {
-      const double own = stack.modes.lump_from_mode[l][i];
-      out.to_surface[l] += own * mode.resistance_m2k_w * gains.end_frac[i];
-      for (std::size_t m = 0; m < stack.column.count; ++m) {
-        out.to_side[l][m] +=
-            own * steady_s * stack.modes.mode_from_lump[i][m] / stack.column.heat_j_m2_k[m];
-      }
-    }
+  // Give the net flux to partners, which it drives. A covered face has none.
+  if (!m.prescribed() && !sample.covered) {
+    out.flux_w_m2 = static_cast<float>(physics::foster_flux_w_m2(
+        offset_k, absorbed(sample.material, film, in, part), surfaces_[sample.material]));
   }
   return out;
 }
 
-double FosterHeat::losses_w_m2_k(const SurfaceSample& sample, const HeatInterval& interval,
-                                 const SampleDrive& drive, double offset_k) const noexcept {
-  if (sample.covered) return 0.0;
-  const double t = reference_k_ + offset_k;
-  return 4.0 * stacks_[stack_of(sample)].surface.emission_w_m2_k4 * t * t * t +
-         interval.forcing.end.film_w_m2_k + drive.part.end.contact_w_m2_k;
-}
-
-physics::ColumnModes::Matrix FosterHeat::side_gains(const SurfaceSample& sample,
-                                                    const HeatInterval& interval,
-                                                    const SampleDrive& drive, const SideHeat& side,
-                                                    double offset_k) const noexcept {
-  const std::size_t index = stack_of(sample);
-  const std::size_t count = stacks_[index].column.count;
-  const SideResponse& response = interval.sides[index];
-  const double losses = losses_w_m2_k(sample, interval, drive, offset_k);
-  // Take the losses of the surface into the answer: its flux falls by them as it warms.
-  physics::ColumnModes::Matrix a = response.to_side;
-  const double held = losses / (1.0 + losses * response.to_surface[0]);
-  for (std::size_t l = 0; l < count; ++l) {
-    for (std::size_t m = 0; m < count; ++m) {
-      a[l][m] -= response.to_surface[l] * held * response.to_side[0][m];
-      a[l][m] *= side.conductance_w_m2_k[m];
-    }
-  }
-  // Solve (1 + A) M = A by elimination. A has positive eigenvalues, so that no pivot vanishes.
-  physics::ColumnModes::Matrix left = a;
-  for (std::size_t l = 0; l < count; ++l) left[l][l] += 1.0;
-  for (std::size_t k = 0; k < count; ++k) {
-    const double pivot = 1.0 / left[k][k];
-    for (std::size_t i = 0; i < count; ++i) {
-      if (i == k) continue;
-      const double factor = left[i][k] * pivot;
-      for (std::size_t j = 0; j < count; ++j) {
-        left[i][j] -= factor * left[k][j];
-        a[i][j] -= factor * a[k][j];
-      }
-    }
-  }
-  for (std::size_t k = 0; k < count; ++k) {
-    for (std::size_t j = 0; j < count; ++j) a[k][j] /= left[k][k];
-  }
-  return a;
-}
-
-void FosterHeat::take_aside(const SampleAdvance& each, const HeatInterval& interval,
-                            const FosterState<double>& from_w_m2, double change_k,
-                            double offset_k) const noexcept {
-  const std::size_t index = stack_of(*each.sample);
-  const Stack& stack = stacks_[index];
-  const physics::FosterGains<double>& gains = interval.ladders[index].level[0];
-  const double lost_w_m2 = losses_w_m2_k(*each.sample, interval, each.drive, offset_k) * change_k;
-  for (std::size_t i = 0; i < stack.network.count; ++i) {
-    const physics::NetworkMode& mode = stack.network.modes[i];
-    double rate_k_s = 0.0;
-    for (std::size_t m = 0; m < stack.column.count; ++m) {
-      rate_k_s += stack.modes.mode_from_lump[i][m] / stack.column.heat_j_m2_k[m] * from_w_m2[m];
-    }
-    each.state->modes_k[i] += mode.tau_s * (gains.start_frac[i] + gains.end_frac[i]) * rate_k_s -
-                              mode.resistance_m2k_w * gains.end_frac[i] * lost_w_m2;
-  }
-}
-
-void FosterHeat::conduct_aside(const SampleAdvance& each,
-                               const HeatInterval& interval) const noexcept {
-  const SideHeat& side = each.drive.side;
-  if (std::ranges::none_of(side.conductance_w_m2_k, [](double g) { return g > 0.0; })) return;
-  const SurfaceSample& sample = *each.sample;
-  const Stack& stack = stacks_[stack_of(sample)];
-  const double base_k = sample.body >= 0 ? each.drive.body_k : stack.surface.base_offset_k;
-  FosterState<double> below_k = product(stack.modes.lump_from_mode, each.state->modes_k);
-  for (std::size_t l = 0; l < below_k.size(); ++l)
-    below_k[l] = side.mean_k[l] - base_k - below_k[l];
-  const double offset_k = side.mean_k[0] - below_k[0];
-  const FosterState<double> change_k =
-      product(side_gains(sample, interval, each.drive, side, offset_k), below_k);
-  FosterState<double> from_w_m2{};
-  for (std::size_t l = 0; l < from_w_m2.size(); ++l) {
-    from_w_m2[l] = side.conductance_w_m2_k[l] * (below_k[l] - change_k[l]);
-  }
-  take_aside(each, interval, from_w_m2, change_k[0], offset_k);
+double FosterHeat::offset_k(std::uint32_t material, const SampleState& state) const noexcept {
+  if (materials_[material].prescribed()) return materials_[material].prescribed_k - reference_k_;
+  // Add the modes of the sample and those that its partners drive (physics.md eq. 22).
+  double offset_k = physics::foster_offset_k(state.modes_k, surfaces_[material]);
+  for (const FosterState<double>& partner : state.partner_k) offset_k += sum(partner);
+  return offset_k;
 }
 
 SampleOutput FosterHeat::output(const SurfaceSample& sample, const glm::vec3& normal,
                                 const SurfaceForcing& forcing, const SampleDrive& drive,
                                 const SampleState& state) const noexcept {
   const Incoming in = incoming(sample, normal, forcing, drive, drive.longwave_begin_w_m2);
-  return output_of(sample, in, drive, offset_k(sample, state));
+  const double offset = offset_k(sample.material, state);
+  const EntityAir* air = drive.air;
+  FilmDrive film;
+  film.air_k = air != nullptr ? air->begin_air_k : forcing.air_k;
+  film.film_w_m2_k = physics::film_w_m2_k(air != nullptr ? air->begin : forcing.film,
+                                          glm::dvec3(normal), materials_[sample.material].roughness,
+                                          reference_k_ + offset - film.air_k);
+  return output_of(sample, film, in, drive, drive.part.begin, offset);
 }
 
 bool FosterHeat::begin_advance(const SampleAdvance& each, const HeatInterval& interval,
@@ -393,18 +208,28 @@ bool FosterHeat::begin_advance(const SampleAdvance& each, const HeatInterval& in
                                         each.back, &SampleDrive::longwave_begin_w_m2);
   const Incoming body_end = into_body(end, sample.covered, each.normal, forcing.end, each.back,
                                       &SampleDrive::longwave_end_w_m2);
-  const std::size_t index = stack_of(sample);
-  lane.ladder = &interval.ladders[index];
+  lane.ladder = &interval.ladders[sample.material];
+  const physics::FosterGains<double>& gains = lane.ladder->level[0];
   // Reduce the resistances at the foot of a solid (physics.md eq. 23).
   FosterSurface<double>& surface = lane.surface;
-  surface = stacks_[index].surface;
+  surface = surfaces_[sample.material];
   surface.base_offset_k += count_from_body(each, -1.0);
   for (std::size_t i = 0; i < physics::kMaxFosterModes; ++i) {
     surface.resistance_m2k_w[i] *= sample.open_frac[i];
   }
-  // Let the modes decay without any flux if all faces are covered.
+  // Advance the modes that the partners drive. They shift the temperature above which the own flux
+  // acts, so their mean over the interval is added to the base.
+  for (std::size_t p = 0; p < kMaxPartners; ++p) {
+    if (sample.partners[p].sample == kNoSample) continue;
+    FosterState<double>& partner_k = each.state->partner_k[p];
+    const double before_k = sum(partner_k);
+    relax(partner_k, surface, sample.partners[p].weight_frac, drive.partner_begin_w_m2[p],
+          drive.partner_end_w_m2[p], gains);
+    surface.base_offset_k += 0.5 * (before_k + sum(partner_k));
+  }
+  // Let the own modes decay without any flux if all faces are covered.
   if (sample.covered && (each.back == nullptr || each.back->sample.covered)) {
-    relax(each.state->modes_k, lane.ladder->level[0]);
+    relax(each.state->modes_k, surface, kWhole, 0.0, 0.0, gains);
     return false;
   }
   lane.x = &each.state->modes_k;
@@ -413,25 +238,23 @@ bool FosterHeat::begin_advance(const SampleAdvance& each, const HeatInterval& in
   return true;
 }
 
-BaseConductance FosterHeat::base_conductance(const SurfaceSample& sample) const noexcept {
-  const Stack& stack = stacks_[stack_of(sample)];
+BaseConductance FosterHeat::base_conductance(std::uint32_t material) const noexcept {
+  const FosterMaterial& m = materials_[material];
   BaseConductance out;
-  for (std::size_t i = 0; i < stack.network.count; ++i) {
-    out.sudden_w_m2_k +=
-        stack.base_shares[i] * stack.base_shares[i] / stack.network.modes[i].resistance_m2k_w;
+  for (std::size_t i = 0; i < m.network.count; ++i) {
+    out.sudden_w_m2_k += m.base_shares[i] * m.base_shares[i] / m.network.modes[i].resistance_m2k_w;
   }
-  if (stack.network.count != 0) out.steady_w_m2_k = 1.0 / stack.network.resistance_m2k_w();
+  if (m.network.count != 0) out.steady_w_m2_k = 1.0 / m.network.resistance_m2k_w();
   return out;
 }
 
-double FosterHeat::into_base_w_m2(const SurfaceSample& sample,
-                                  const SampleState& state) const noexcept {
-  const Stack& stack = stacks_[stack_of(sample)];
-  const double base_k = stack.surface.base_offset_k;
+double FosterHeat::into_base_w_m2(std::uint32_t material, const SampleState& state) const noexcept {
+  const FosterMaterial& m = materials_[material];
+  const double base_k = surfaces_[material].base_offset_k;
   double flux_w_m2 = 0.0;
-  for (std::size_t i = 0; i < stack.network.count; ++i) {
-    flux_w_m2 += stack.base_shares[i] / stack.network.modes[i].resistance_m2k_w *
-                 (state.modes_k[i] + stack.base_shares[i] * base_k);
+  for (std::size_t i = 0; i < m.network.count; ++i) {
+    flux_w_m2 += m.base_shares[i] / m.network.modes[i].resistance_m2k_w *
+                 (state.modes_k[i] + m.base_shares[i] * base_k);
   }
   return flux_w_m2;
 }
@@ -439,9 +262,8 @@ double FosterHeat::into_base_w_m2(const SurfaceSample& sample,
 double FosterHeat::count_from_body(const SampleAdvance& each, double sign) const noexcept {
   const SurfaceSample& sample = *each.sample;
   if (sample.body < 0) return 0.0;
-  const Stack& stack = stacks_[stack_of(sample)];
-  const double warmer_k = each.drive.body_k - stack.surface.base_offset_k;
-  const FosterState<double>& shares = stack.base_shares;
+  const double warmer_k = each.drive.body_k - surfaces_[sample.material].base_offset_k;
+  const FosterState<double>& shares = materials_[sample.material].base_shares;
   for (std::size_t i = 0; i < physics::kMaxFosterModes; ++i) {
     each.state->modes_k[i] += sign * shares[i] * warmer_k;
   }
@@ -468,9 +290,9 @@ void FosterHeat::advance_group(std::span<SampleAdvance> group,
   physics::foster_advance_all(std::span(lanes).first(count), tolerance_k_);
   for (std::size_t i = 0; i < group.size(); ++i) {
     SampleAdvance& each = group[i];
-    conduct_aside(each, interval);
     count_from_body(each, 1.0);
-    each.output = output_of(*each.sample, ends[i], each.drive, offset_k(*each.sample, *each.state));
+    each.output = output_of(*each.sample, end_films[i], ends[i], each.drive, each.drive.part.end,
+                            offset_k(each.sample->material, *each.state));
   }
 }
 
@@ -495,7 +317,7 @@ void FosterHeat::advance_unshadowed(std::uint32_t material, const glm::vec3& nor
                             offset_k);
   };
   physics::foster_advance(modes_k, drive(interval.forcing.begin), drive(interval.forcing.end),
-                          interval.ladders[material], stacks_[material].surface, tolerance_k_);
+                          interval.ladders[material], surfaces_[material], tolerance_k_);
 }
 
 void FosterHeat::step_response(std::uint32_t material, const ResponseConditions& around,

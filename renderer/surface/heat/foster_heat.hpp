@@ -7,7 +7,6 @@
 #include <span>
 #include <vector>
 
-#include "emit/physics/conduction_column.hpp"
 #include "history/foster_history.hpp"
 #include "surface/heat/heat_interval.hpp"
 #include "surface/heat/surface_samples.hpp"
@@ -22,7 +21,7 @@ struct BaseConductance {
 };
 
 /// Extended thermal model on samples: surface balance, flux-driven states, radiation of other
-/// samples and conduction along the surface (physics.md eq. 16-18, 20, 22).
+/// samples and conduction across edges (physics.md eq. 16-18, 20, 22).
 /// Immutable after construction; any thread; RT-safe except for the constructor and size().
 class FosterHeat {
  public:
@@ -32,10 +31,7 @@ class FosterHeat {
   FosterHeat(std::span<const FosterMaterial> materials, double reference_k, double tolerance_k);
 
   /// Gives `interval` room for the gains. It allocates.
-  void size(HeatInterval& interval) const {
-    interval.ladders.resize(stacks_.size());
-    interval.sides.resize(stacks_.size());
-  }
+  void size(HeatInterval& interval) const { interval.ladders.resize(materials_.size()); }
   /// Fills the gains of an interval whose forcing is already set.
   void prepare(HeatInterval& interval) const noexcept;
 
@@ -63,54 +59,17 @@ class FosterHeat {
   /// Returns the temperature at which the base of a material starts, from the reference
   /// temperature.
   [[nodiscard]] double base_offset_k(std::uint32_t material) const noexcept {
-    return stacks_[material].surface.base_offset_k;
+    return surfaces_[material].base_offset_k;
   }
   /// Returns a temperature as an offset from the reference temperature.
   [[nodiscard]] double offset_of_k(double temperature_k) const noexcept {
     return temperature_k - reference_k_;
   }
-  [[nodiscard]] BaseConductance base_conductance(const SurfaceSample& sample) const noexcept;
+  [[nodiscard]] BaseConductance base_conductance(std::uint32_t material) const noexcept;
   /// Returns the flux that a stack in this state would pass into a base of the reference
   /// temperature (physics.md eq. 28).
-  [[nodiscard]] double into_base_w_m2(const SurfaceSample& sample,
+  [[nodiscard]] double into_base_w_m2(std::uint32_t material,
                                       const SampleState& state) const noexcept;
-
-  /// Lumps of the stacks of a material; null where heat does not move sideways: in sheets, in
-  /// prescribed temperatures, and in materials without layers.
-  [[nodiscard]] const physics::ConductionColumn* column(std::uint32_t material) const noexcept {
-    return materials_[material].layers.empty() ? nullptr : &stacks_[material].column;
-  }
-  [[nodiscard]] const physics::ColumnDepths& depths(std::uint32_t material) const noexcept {
-    return stacks_[material].depths;
-  }
-  [[nodiscard]] std::span<const physics::StackLayer> layers(std::uint32_t material) const noexcept {
-    return materials_[material].layers;
-  }
-  /// Turns a state of the whole stack into that of the sample's column, lump by lump.
-  void cut(const SurfaceSample& sample, SampleState& state) const noexcept;
-  /// Returns the temperatures of the lumps of a column, from the reference temperature. `body_k` is
-  /// that of the sample's body, if it has one.
-  [[nodiscard]] physics::FosterState<double> lumps_k(const SurfaceSample& sample,
-                                                     const SampleState& state,
-                                                     double body_k) const noexcept;
-  /// Returns what a sample of the state `own` meets beside it over an interval that its neighbours
-  /// begin in `states`.
-  [[nodiscard]] SideHeat side_heat(const SurfaceSamples& all, const SurfaceSample& sample,
-                                   const SampleState& own, std::span<const SampleState> states,
-                                   double body_k) const noexcept;
-  /// Returns how the lumps of a sample follow those beside it over an interval: lump l ends up
-  /// warmer by sum_m [l][m] d_m if those beside lump m are warmer by d_m than it would be without
-  /// them. Entries of a row add up to less than 1. `offset_k` is the surface without them.
-  [[nodiscard]] physics::ColumnModes::Matrix side_gains(const SurfaceSample& sample,
-                                                        const HeatInterval& interval,
-                                                        const SampleDrive& drive,
-                                                        const SideHeat& side,
-                                                        double offset_k) const noexcept;
-  /// Adds to a state at the end of an interval the heat that came from beside. `change_k` is what
-  /// it changes in each lump, `from_w_m2` the flux into each.
-  void take_aside(const SampleAdvance& each, const HeatInterval& interval,
-                  const physics::FosterState<double>& from_w_m2, double change_k,
-                  double offset_k) const noexcept;
 
   /// Returns the output of a sample in this state; see SampleHeat::output().
   SampleOutput output(const SurfaceSample& sample, const glm::vec3& normal,
@@ -144,16 +103,22 @@ class FosterHeat {
   [[nodiscard]] Incoming into_body(const Incoming& own, bool own_covered, const glm::vec3& normal,
                                    const SurfaceForcing& forcing, const SheetBack* back,
                                    double SampleDrive::*longwave_w_m2) const noexcept;
-  /// Fills `lane` and returns true if the surface balance drives the modes of a sample; it advances
-  /// those of a covered one. `end` is what arrives at the face at the end of the interval.
+  /// Film and air of a face, or their mean over both faces of a sheet.
+  struct FilmDrive {
+    double film_w_m2_k = 0.0;
+    double air_k = 0.0;
+  };
+  /// Film and air at both ends of an interval.
+  struct FilmSpan {
+    FilmDrive begin;
+    FilmDrive end;
+  };
+  /// Advances what a sample does not share with others: modes that its partners drive, and the own
+  /// modes of a covered one. If the surface balance drives its own modes, it returns true and fills
+  /// `lane`. `end` is what arrives at the face at the end of the interval.
   [[nodiscard]] bool begin_advance(const SampleAdvance& each, const HeatInterval& interval,
-                                   const Incoming& end, physics::FosterLane& lane) const noexcept;
-  /// Exchanges heat with the neighbours over an interval, after everything else. The step is
-  /// implicit in the own temperature, so that it never goes beyond that of the neighbours.
-  void conduct_aside(const SampleAdvance& each, const HeatInterval& interval) const noexcept;
-  /// Returns by how much the flux into a surface falls with its temperature, W m-2 K-1.
-  [[nodiscard]] double losses_w_m2_k(const SurfaceSample& sample, const HeatInterval& interval,
-                                     const SampleDrive& drive, double offset_k) const noexcept;
+                                   const Incoming& end, const FilmSpan& film,
+                                   physics::FosterLane& lane) const noexcept;
   /// Counts the modes of a sample on a body from its interior (`sign` = -1), or from the base of
   /// its material again (+1), physics.md eq. 27. Returns how much warmer the interior is than that
   /// base.
@@ -170,31 +135,15 @@ class FosterHeat {
                                                       const Incoming& in,
                                                       const PartHeat& part) const noexcept;
   /// Returns the output of a sample of known temperature.
-  [[nodiscard]] SampleOutput output_of(const SurfaceSample& sample, const Incoming& in,
-                                       const SampleDrive& drive, double offset_k) const noexcept;
-  /// Returns the surface temperature as an offset from the reference temperature.
-  [[nodiscard]] double offset_k(const SurfaceSample& sample,
-                                const SampleState& state) const noexcept;
-
-  /// Stack of a material as it is, or cut off at a depth.
-  struct Stack {
-    physics::FosterSurface<double> surface;
-    physics::FosterNetwork network;
-    physics::FosterState<double> base_shares{};
-    physics::ConductionColumn column;
-    physics::ColumnDepths depths;
-    physics::ColumnModes modes;
-  };
-  /// Returns the answers of a stack over an interval with these gains.
-  [[nodiscard]] SideResponse side_response(std::size_t index,
-                                           const physics::FosterLadder& ladder) const noexcept;
-  /// Index of the stack of a sample.
-  [[nodiscard]] std::size_t stack_of(const SurfaceSample& sample) const noexcept {
-    return sample.material + sample.cut * materials_.size();
-  }
+  [[nodiscard]] SampleOutput output_of(const SurfaceSample& sample, const FilmDrive& film,
+                                       const Incoming& in, const SampleDrive& drive,
+                                       const PartHeat& part, double offset_k) const noexcept;
+  /// Returns the surface temperature as an offset from the reference temperature, partners
+  /// included.
+  [[nodiscard]] double offset_k(std::uint32_t material, const SampleState& state) const noexcept;
 
   std::vector<FosterMaterial> materials_;
-  std::vector<Stack> stacks_;  ///< by cut, then material; the whole stacks come first
+  std::vector<physics::FosterSurface<double>> surfaces_;
   double reference_k_ = 0.0;
   double tolerance_k_ = 0.0;
 };

@@ -8,7 +8,6 @@
 #include <span>
 #include <vector>
 
-#include "emit/physics/conduction_column.hpp"
 #include "emit/physics/foster.hpp"
 #include "emit/physics/relaxation.hpp"
 #include "emit/renderer/surface_forcing.hpp"
@@ -58,18 +57,6 @@ struct EntityForcing {
   }
 };
 
-/// Columns beside a sample, lump by lump (physics.md eq. 22).
-struct SideHeat {
-  physics::FosterState<double> conductance_w_m2_k{};  ///< sum over the neighbours
-  /// Mean temperature of the neighbours by their conductance, from the reference temperature.
-  physics::FosterState<double> mean_k{};
-};
-/// Answer of the lumps of a stack at the end of an interval, m2 K/W.
-struct SideResponse {
-  physics::ColumnModes::Matrix to_side{};     ///< [l][m]: of lump l to a steady flux into lump m
-  physics::FosterState<double> to_surface{};  ///< to the flux through the surface at that end
-};
-
 /// Input of one sample over one interval, in addition to the forcing that all samples share.
 struct SampleDrive {
   float sun_frac = 0.0F;  ///< visible share of the sun's disc, mean over the interval
@@ -86,7 +73,10 @@ struct SampleDrive {
   /// Temperature of the interior of the sample's body, mean over the interval, from the reference
   /// temperature. It counts if the sample has a body.
   double body_k = 0.0;
-  SideHeat side;
+  /// Net fluxes into the faces of the partners at the begin and the end of the interval (physics.md
+  /// eq. 22).
+  std::array<double, kMaxPartners> partner_begin_w_m2{};
+  std::array<double, kMaxPartners> partner_end_w_m2{};
   /// Heat of the part that the sample belongs to (physics.md eq. 29).
   PartHeatSpan part;
   /// Air past the sample's entity, in the forcing of the interval. Null: the air of the scenery.
@@ -128,16 +118,15 @@ struct SampleAdvance {
 /// Number of samples that are best advanced together.
 inline constexpr std::size_t kAdvanceTogether = physics::kFosterLanes;
 
-/// Forcing of an interval and the gains of the thermal model over it. The vectors of the model that
-/// is not in use stay empty.
+/// Forcing of an interval and the gains of the thermal model over it, one entry per material. The
+/// vector of the model that is not in use stays empty.
 struct HeatInterval {
   using Relaxation = std::array<physics::RelaxationGains<double>, kMaxRelaxationModes>;
 
   IntervalForcing forcing;
-  PartForcing parts;
-  std::vector<physics::FosterLadder> ladders;  ///< gains of the model foster, by stack
-  std::vector<SideResponse> sides;             ///< by stack
-  std::vector<Relaxation> relaxation;          ///< gains of the model emit2014, by material
+  EntityForcing entities;
+  std::vector<physics::FosterLadder> ladders;  ///< gains of the model foster
+  std::vector<Relaxation> relaxation;          ///< gains of the model emit2014
 };
 
 }  // namespace emit::renderer

@@ -96,6 +96,9 @@ template <class T>
                                          double frac) noexcept {
   SampleState out;
   out.modes_k = between(a.modes_k, b.modes_k, frac);
+  for (std::size_t p = 0; p < kMaxPartners; ++p) {
+    out.partner_k[p] = between(a.partner_k[p], b.partner_k[p], frac);
+  }
   return out;
 }
 [[nodiscard]] inline SampleOutput between(const SampleOutput& a, const SampleOutput& b,
@@ -103,7 +106,7 @@ template <class T>
   SampleOutput out;
   for (float SampleOutput::*value :
        {&SampleOutput::offset_k, &SampleOutput::sun_frac, &SampleOutput::longwave_out_w_m2,
-        &SampleOutput::shortwave_out_w_m2}) {
+        &SampleOutput::shortwave_out_w_m2, &SampleOutput::flux_w_m2}) {
     out.*value = between(a.*value, b.*value, frac);
   }
   return out;

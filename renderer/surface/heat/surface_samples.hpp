@@ -13,8 +13,8 @@ namespace emit::renderer {
 
 /// Index that stands for no sample.
 inline constexpr std::uint32_t kNoSample = 0xffffffffU;
-/// Number of depths, beside the whole stack, at which the column of a sample near an edge may end.
-inline constexpr std::uint32_t kColumnCuts = 7;
+/// Largest number of faces across convex edges with which a sample exchanges heat.
+inline constexpr std::size_t kMaxPartners = 2;
 
 /// Sample in whose neighbourhood rays of a view ended, and the share of those rays.
 struct SeenSample {
@@ -22,11 +22,13 @@ struct SeenSample {
   float weight_frac = 0.0F;
 };
 
-/// Neighbour with which a sample exchanges heat sideways, lump by lump of their columns (physics.md
-/// eq. 22), and the conductances between them per area of the sample.
-struct SideLink {
+/// Partner of a sample: the point of the neighbouring face that has the same distance from their
+/// convex edge.
+struct Partner {
   std::uint32_t sample = kNoSample;
-  std::array<float, physics::kMaxFosterModes> conductance_w_m2_k{};
+  float distance_m = 0.0F;  ///< distance of either point from the edge
+  /// Share w_i of the partner's flux that drives each mode (physics.md eq. 22).
+  std::array<float, physics::kMaxFosterModes> weight_frac{};
 };
 
 /// Place, material and view of a sample. They are fixed while the geometry of the scene stays the
@@ -63,11 +65,7 @@ struct SurfaceSample {
   std::uint32_t other_side = kNoSample;
   float flat_m = 0.0F;   ///< the surface is plane at least this far in all directions
   float facet_m = 0.0F;  ///< longest edge of the triangles on which it lies, before any is halved
-  std::uint32_t first_link = 0;  ///< neighbours beside it: entries of SurfaceSamples::links
-  std::uint32_t link_count = 0;
-  /// Depth at which the column ends because another face owns what lies deeper: 0 for the whole
-  /// stack, else cut_frac() of it.
-  std::uint8_t cut = 0;
+  std::array<Partner, kMaxPartners> partners{};
 };
 
 /// Measure by which directions count when a sample looks for sky.
@@ -76,19 +74,15 @@ enum class SkyMeasure : std::uint8_t {
   sphere,  ///< all directions of the full sphere count alike
 };
 
-/// Share of a stack's thickness at which a column of this cut ends, 1..kColumnCuts. Cuts near the
-/// surface lie close together, because lumps do.
-[[nodiscard]] constexpr double cut_frac(std::uint32_t cut) noexcept {
-  const double way = static_cast<double>(cut) / (kColumnCuts + 1.0);
-  return way * way;
-}
-
 /// Heat of a sample at the end of an interval, as values of the modes of its thermal model. With
 /// foster they are kelvins above the base (physics.md eq. 17), with emit2014 offsets from the
 /// reference temperature.
 struct SampleState {
-  /// With foster the flux drives the modes, with emit2014 the equilibrium temperature.
+  /// Modes of the sample itself. With foster its own flux drives them, with emit2014 its
+  /// equilibrium temperature.
   physics::FosterState<double> modes_k{};
+  /// Modes y_i that the fluxes of each partner drive (physics.md eq. 22).
+  std::array<physics::FosterState<double>, kMaxPartners> partner_k{};
 };
 
 /// Output of a sample at one node of time, which other samples and the device read.
@@ -100,13 +94,13 @@ struct SampleOutput {
   float sun_frac = 0.0F;
   float longwave_out_w_m2 = 0.0F;   ///< emitted and reflected
   float shortwave_out_w_m2 = 0.0F;  ///< reflected sunlight, mean of the interval before
+  float flux_w_m2 = 0.0F;           ///< net flux into the solid
 };
 
-/// All samples of a scene, the lists of samples that they see and those of their neighbours.
+/// All samples of a scene and the lists of samples that they see.
 struct SurfaceSamples {
   std::vector<SurfaceSample> samples;
   std::vector<SeenSample> seen;  ///< lists of all samples, one after the other
-  std::vector<SideLink> links;   ///< neighbours of all samples, one sample after the other
 };
 
 /// Returns whether a sample is advanced on its own. It is false for the second side of a sheet,

@@ -31,6 +31,12 @@ std::size_t name_bodies(const scene::SceneGeometry& geometry, const SampleHeat& 
       const auto body = bodies.try_emplace({instance.object, instance.placement},
                                            static_cast<std::int32_t>(bodies.size()));
       all[s].body = body.first->second;
+      // Faces across an edge belong to the same body.
+      for (const Partner& partner : all[s].partners) {
+        if (partner.sample == kNoSample) continue;
+        SurfaceSample& other = all[partner.sample];
+        if (heat.rests_on_body(other.material)) other.body = all[s].body;
+      }
     }
   }
   return bodies.size();
@@ -57,7 +63,7 @@ BodyNodes::BodyNodes(const SurfaceModel& model, const scene::SceneGeometry& geom
                                                ? geometry.interiors[instance.object]
                                                : scene::BodyInterior{};
       Node& node = nodes_[static_cast<std::size_t>(all[s].body)];
-      const BaseConductance faces = heat.of_bodies().base_conductance(all[s]);
+      const BaseConductance faces = heat.of_bodies().base_conductance(all[s].material);
       const double area = area_m2[v];
       node.heat_j_k += interior.heat_j_m2_k * area;
       node.ventilation_w_k += interior.ventilation_w_m2_k * area;

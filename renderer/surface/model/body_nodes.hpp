@@ -37,7 +37,8 @@ class BodyNodes {
   /// @pre the sample has a body
   [[nodiscard]] double inflow_w(const SurfaceSamples& all, std::uint32_t sample,
                                 const SampleState& state) const noexcept {
-    return area_m2_[sample] * heat_->of_bodies().into_base_w_m2(all.samples[sample], state);
+    return area_m2_[sample] *
+           heat_->of_bodies().into_base_w_m2(all.samples[sample].material, state);
   }
   /// Sums the inflow of every body over its samples.
   /// @pre `out_w` has an entry for every body

@@ -355,4 +355,53 @@ SurfaceView ViewSampler::view(const CasterRays& casters, const ViewPoint& point,
   return view;
 }
 
+AdjacentFaces adjacent_faces(const CasterRays& casters, const ViewPoint& point, float reach_m,
+                             const CasterSelection& selection) noexcept {
+  constexpr std::size_t kTangents = 8;
+  constexpr float kCosOwnFace = 0.5F;     // 60 degrees
+  constexpr float kCosSameFace = 0.766F;  // 40 degrees
+  const Tangents tangents = tangents_of(point.normal);
+  const glm::vec3 start_offset_m = point.offset_m * (point.inward - point.normal);
+  // Send rays along eight tangents from a point just below the surface.
+  std::array<CasterRay, kTangents> rays;
+  std::array<CasterHit, kTangents> hits;
+  for (std::size_t i = 0; i < kTangents; ++i) {
+    const float angle_rad = static_cast<float>(2.0 * physics::kPi) * static_cast<float>(i) /
+                            static_cast<float>(kTangents);
+    rays[i] = {point.position_m + start_offset_m,
+               std::cos(angle_rad) * tangents.u + std::sin(angle_rad) * tangents.v};
+  }
+  const std::uint32_t lanes = casters.first_hits(rays, selection, hits);
+
+  // Keep faces that are hit from behind, face elsewhere and are near.
+  std::array<AdjacentFace, kTangents> found;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < kTangents; ++i) {
+    const CasterHit& hit = hits[i];
+    if (((lanes >> i) & 1U) == 0U || hit.front) continue;
+    if (glm::dot(hit.normal, point.normal) > kCosOwnFace) continue;
+    const float distance_m =
+        glm::dot(hit.normal, start_offset_m + hit.distance_m * rays[i].direction);
+    if (distance_m > reach_m) continue;
+    found[count++] = {hit.normal, std::max(distance_m, 0.0F)};
+  }
+  // Sort by distance. Insertion keeps the order of the tangents among equals and is fast for eight
+  // entries.
+  for (std::size_t i = 1; i < count; ++i) {
+    for (std::size_t k = i; k > 0 && found[k].distance_m < found[k - 1].distance_m; --k) {
+      std::swap(found[k], found[k - 1]);
+    }
+  }
+  // Drop faces that point nearly the same way as a nearer one.
+  AdjacentFaces out;
+  for (std::size_t i = 0; i < count && out.count < out.faces.size(); ++i) {
+    const bool known = std::any_of(out.faces.begin(), out.faces.begin() + out.count,
+                                   [&](const AdjacentFace& face) {
+                                     return glm::dot(face.normal, found[i].normal) > kCosSameFace;
+                                   });
+    if (!known) out.faces[out.count++] = found[i];
+  }
+  return out;
+}
+
 }  // namespace emit::renderer

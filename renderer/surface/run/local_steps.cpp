@@ -258,14 +258,13 @@ void LocalSteps::step(std::span<const std::uint32_t> blocks, std::uint32_t end,
                       const SurfaceNode& from, const IntervalRays& rays,
                       const HeatInterval& interval, const Inputs& inputs,
                       const Keep& keep) noexcept {
-  // Step a batch on all cores before anything is written, because samples read the states and
+  // Step a batch on all cores before anything is written, because samples read each other's
   // outputs.
   const auto flush = [&] {
     inputs.workers.run(batch_.size(), kSamplesPerTask, [&](std::size_t begin, std::size_t stop) {
       for (std::size_t k = begin; k < stop; ++k) {
         stepped_[k].state = from.states[batch_[k]];
-        step_sample(inputs.step, rays, interval, {from.states, from.outputs}, batch_[k],
-                    stepped_[k]);
+        step_sample(inputs.step, rays, interval, from.outputs, batch_[k], stepped_[k]);
       }
     });
     for (std::size_t k = 0; k < batch_.size(); ++k) {

@@ -117,7 +117,7 @@ class ViewedSample {
 
 /// Input of a sample over an interval. Other samples count with their output at its begin.
 SampleDrive drive_of(const SurfaceStep& step, const IntervalRays& interval_rays,
-                     const PartForcing& parts, const SurfaceBegin& begin, const SampleState& state,
+                     const EntityForcing& entities, std::span<const SampleOutput> begin,
                      const ViewedSample& viewed, const RayOffsets& offsets,
                      const SunShare& sun) noexcept {
   const SurfaceSample& sample = viewed.sample();
@@ -148,7 +148,7 @@ SampleDrive drive_of(const SurfaceStep& step, const IntervalRays& interval_rays,
   const bool some_left = sample.entity >= 0 && !step.views.empty();
   for (std::uint32_t k = 0; k < sample.seen_count; ++k) {
     const SeenSample& seen = step.all.seen[sample.first_seen + k];
-    const SampleOutput& other = begin.outputs[seen.sample];
+    const SampleOutput& other = begin[seen.sample];
     const std::int32_t of_entity = step.all.samples[seen.sample].entity;
     Radiation& sum = apart && of_entity == sample.entity ? own : others;
     float weight_frac = seen.weight_frac;
@@ -173,8 +173,11 @@ SampleDrive drive_of(const SurfaceStep& step, const IntervalRays& interval_rays,
                          view.own_scale * own.shortwave_w_m2;
   // Let the start of the interval stand for all of it: neighbours change by hundredths of a kelvin.
   drive.longwave_end_w_m2 = drive.longwave_begin_w_m2;
-  if (sample.link_count != 0) {
-    drive.side = step.heat.foster()->side_heat(step.all, sample, state, begin.states, drive.body_k);
+  for (std::size_t p = 0; p < kMaxPartners; ++p) {
+    const std::uint32_t partner = sample.partners[p].sample;
+    if (partner == kNoSample) continue;
+    drive.partner_begin_w_m2[p] = begin[partner].flux_w_m2;
+    drive.partner_end_w_m2[p] = drive.partner_begin_w_m2[p];
   }
   return drive;
 }
@@ -182,8 +185,8 @@ SampleDrive drive_of(const SurfaceStep& step, const IntervalRays& interval_rays,
 }  // namespace
 
 void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
-                 const HeatInterval& interval, const SurfaceBegin& begin, std::uint32_t index,
-                 SteppedSample& stepped) noexcept {
+                 const HeatInterval& interval, std::span<const SampleOutput> begin,
+                 std::uint32_t index, SteppedSample& stepped) noexcept {
   EMIT_DCHECK(steps_itself(step.all, index));
   const ViewedSample viewed(step, interval_rays, step.all.samples[index]);
   const SurfaceSample& sample = viewed.sample();
@@ -193,7 +196,7 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
   };
   const SunShare sun = sun_of(sample);
   const SampleDrive drive =
-      drive_of(step, interval_rays, interval.parts, begin, stepped.state, viewed, offsets, sun);
+      drive_of(step, interval_rays, interval.entities, begin, viewed, offsets, sun);
   const glm::vec3 normal = interval_rays.normal(sample);
   if (sample.other_side == kNoSample) {
     stepped.output = step.heat.advance(sample, normal, interval, drive, stepped.state);
@@ -205,8 +208,8 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
   const ViewedSample viewed_behind(step, interval_rays, step.all.samples[sample.other_side]);
   const SurfaceSample& behind = viewed_behind.sample();
   const SunShare sun_behind = sun_of(behind);
-  const SampleDrive back_drive = drive_of(step, interval_rays, interval.parts, begin, stepped.state,
-                                          viewed_behind, offsets, sun_behind);
+  const SampleDrive back_drive =
+      drive_of(step, interval_rays, interval.entities, begin, viewed_behind, offsets, sun_behind);
   const SheetBack back{behind, back_drive};
   stepped.output = step.heat.advance(sample, normal, interval, drive, stepped.state, &back);
   stepped.behind =

@@ -28,12 +28,6 @@ struct SurfaceStep {
   std::span<const BodyView> views{};
 };
 
-/// All samples at the begin of an interval.
-struct SurfaceBegin {
-  std::span<const SampleState> states;
-  std::span<const SampleOutput> outputs;
-};
-
 /// Result of a step of a sample. `behind` is the output of a sheet's other face, which has the same
 /// state.
 struct SteppedSample {
@@ -42,11 +36,11 @@ struct SteppedSample {
   SampleOutput behind;
 };
 
-/// Advances sample `index` over an interval, from the state in `sample`. `begin` holds all
-/// samples at the begin of the interval. Any thread; RT-safe.
+/// Advances sample `index` over an interval, from the state in `sample`. `begin` holds the outputs
+/// of all samples at the begin of the interval. Any thread; RT-safe.
 /// @pre steps_itself(step.all, index): of a sheet it is the face with the lower index
 void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
-                 const HeatInterval& interval, const SurfaceBegin& begin, std::uint32_t index,
-                 SteppedSample& sample) noexcept;
+                 const HeatInterval& interval, std::span<const SampleOutput> begin,
+                 std::uint32_t index, SteppedSample& sample) noexcept;
 
 }  // namespace emit::renderer

@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cmath>
 #include <fstream>
 #include <limits>
 #include <memory>
@@ -64,9 +63,9 @@ void visit_members(T& e, const Visit& visit) {
   visit(e.world_m), visit(e.boresight);
 }
 template <class T, class Visit>
-requires std::same_as<std::remove_const_t<T>, SideLink>
-void visit_members(T& l, const Visit& visit) {
-  visit(l.sample), visit(l.conductance_w_m2_k);
+requires std::same_as<std::remove_const_t<T>, Partner>
+void visit_members(T& p, const Visit& visit) {
+  visit(p.sample), visit(p.distance_m), visit(p.weight_frac);
 }
 template <class T, class Visit>
 requires std::same_as<std::remove_const_t<T>, SeenSample>
@@ -81,18 +80,19 @@ void visit_members(T& s, const Visit& visit) {
   visit(s.far_frac), visit(s.first_seen), visit(s.seen_count), visit(s.seen_scale);
   visit(s.covered);
   visit(s.open_frac), visit(s.open_before_frac), visit(s.flat_m), visit(s.facet_m);
-  visit(s.first_link), visit(s.link_count), visit(s.cut);
+  visit(s.partners);
   visit(s.other_side);
 }
 template <class T, class Visit>
 requires std::same_as<std::remove_const_t<T>, SampleState>
 void visit_members(T& s, const Visit& visit) {
-  visit(s.modes_k);
+  visit(s.modes_k), visit(s.partner_k);
 }
 template <class T, class Visit>
 requires std::same_as<std::remove_const_t<T>, SampleOutput>
 void visit_members(T& o, const Visit& visit) {
   visit(o.offset_k), visit(o.sun_frac), visit(o.longwave_out_w_m2), visit(o.shortwave_out_w_m2);
+  visit(o.flux_w_m2);
 }
 
 namespace {
@@ -117,7 +117,6 @@ void put_model(Sink& sink, const SurfaceModel& model) {
   put_value(sink, model.first_sample);
   put_value(sink, model.samples.samples);
   put_value(sink, model.samples.seen);
-  put_value(sink, model.samples.links);
   put_value(sink, model.drawn_samples);
   put_value(sink, model.states);
   put_value(sink, model.outputs);
@@ -171,7 +170,6 @@ bool consistent(const SurfaceModel& model, const scene::SceneGeometry& geometry,
                 std::size_t entities) {
   const std::size_t count = model.samples.samples.size();
   const std::size_t seen = model.samples.seen.size();
-  const std::size_t links = model.samples.links.size();
   if (model.states.size() != count || model.outputs.size() != count ||
       model.drawn_samples > count || model.first_sample.size() != geometry.instances.size() ||
       model.drawn.size() != model.meshes.size()) {
@@ -222,16 +220,12 @@ bool consistent(const SurfaceModel& model, const scene::SceneGeometry& geometry,
     return sides_fit(s) && s.material < geometry.materials.size() && s.entity >= -1 &&
            s.entity < static_cast<std::int64_t>(entities) && s.body >= -1 &&
            s.body < static_cast<std::int64_t>(model.body_k.size()) && s.first_seen <= seen &&
-           s.seen_count <= seen - s.first_seen && s.first_link <= links &&
-           s.link_count <= links - s.first_link && s.cut <= kColumnCuts;
-  };
-  const auto link_fits = [&](const SideLink& link) {
-    return link.sample < count && std::ranges::all_of(link.conductance_w_m2_k, [](float each) {
-             return std::isfinite(each) && each >= 0.0F;
+           s.seen_count <= seen - s.first_seen &&
+           std::ranges::all_of(s.partners, [&](const Partner& partner) {
+             return partner.sample == kNoSample || partner.sample < count;
            });
   };
   return std::ranges::all_of(model.samples.samples, sample_fits) &&
-         std::ranges::all_of(model.samples.links, link_fits) &&
          std::ranges::all_of(model.samples.seen,
                              [&](const SeenSample& s) { return s.sample < count; });
 }
@@ -402,7 +396,6 @@ Result<SurfaceModel> read_state(const std::filesystem::path& file, const StateWa
   take_value(source, model.first_sample);
   take_value(source, model.samples.samples);
   take_value(source, model.samples.seen);
-  take_value(source, model.samples.links);
   take_value(source, model.drawn_samples);
   take_value(source, model.states);
   take_value(source, model.outputs);

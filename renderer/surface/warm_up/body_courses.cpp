@@ -7,8 +7,7 @@ namespace emit::renderer {
 
 BodyCourses::BodyCourses(const SurfaceModel& model, const scene::SceneGeometry& geometry,
                          const SampleHeat& heat, const HistoryRecord& record,
-                         std::span<const std::uint32_t> samples, std::size_t split,
-                         std::size_t most)
+                         std::span<const std::uint32_t> samples, std::size_t most)
     : all_(model.samples),
       heat_(heat),
       record_(record),
@@ -18,8 +17,7 @@ BodyCourses::BodyCourses(const SurfaceModel& model, const scene::SceneGeometry& 
   std::size_t rows = 0;
   for (std::uint32_t i = 0; i < samples.size(); ++i) {
     const std::int32_t body = all_.samples[samples[i]].body;
-    if (groups_.empty() || groups_.back().body != body || groups_.back().count == most ||
-        i == split) {
+    if (groups_.empty() || groups_.back().body != body || groups_.back().count == most) {
       groups_.push_back({i, 0, body});
       row_of_group_.push_back(rows);
       if (body >= 0) ++rows;

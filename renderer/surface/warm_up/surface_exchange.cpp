@@ -20,10 +20,6 @@ namespace {
 
 /// Groups of samples in one task of a parallel loop.
 constexpr std::size_t kGrain = 8;
-/// Greatest number of rounds in which neighbours agree on their temperatures at the end of an
-/// interval, and the change at which they do.
-constexpr std::uint32_t kSettleRounds = 24;
-constexpr double kSettledK = 0.003;
 constexpr std::uint32_t kNoList = 0xffffffffU;
 /// Intervals in a window: short enough that the radiation within it settles in few iterations and
 /// that its rows stay in the cache, long enough that sums over rows run at full width.
@@ -186,42 +182,57 @@ class Sweeper {
   [[nodiscard]] bool sweep(Pass pass, const SurfaceProgress& report);
 
  private:
-  /// Measures the radiation of the faces of entities at every node, from the latest sweep.
-  void measure_faces();
-  /// Returns true if no sweep changes the sample: it sees no other one, has no neighbour and no
-  /// body, and no entity that sends radiation hides its sky.
+  /// Puts what is known of the radiation in a window into rows, as a guess.
+  void load(const Window& window);
+  /// Iterates a window.
+  void settle(const Window& window);
+  /// Keeps the rows and the states at the end of a window.
+  void store(const Window& window);
+  /// Makes the fluxes and the interiors of this pass those that the next one takes.
+  void take_courses();
+  /// Measures the radiation of the faces of entities at every node of a window. Returns by how much
+  /// it has changed since the call before, W/m2.
+  double measure_faces(const Window& window);
+  /// Returns whether a sample takes a course from the pass before.
+  [[nodiscard]] bool takes_course(std::uint32_t s) const noexcept {
+    return flux_row_[s] != kNoList || model_.samples.samples[s].body >= 0;
+  }
+  /// Advances those groups over a window of which `chosen(s)` is true for a sample.
+  template <class Chosen>
+  void carry_groups(const Window& window, const Chosen& chosen);
+  /// Returns whether the latest iteration has changed what a sample receives in a window.
+  [[nodiscard]] bool changed(std::uint32_t s, const Window& window,
+                             bool faces_changed) const noexcept;
+  /// Returns true if nothing changes the sample: it sees no other one, has no partner and no body,
+  /// and no entity that sends radiation hides its sky.
   [[nodiscard]] bool alone(std::size_t s) const noexcept;
-  /// Input of sample `s` in interval j, without the heat of its neighbours.
-  [[nodiscard]] SampleDrive drive(std::size_t s, const glm::vec3& normal,
-                                  std::size_t j) const noexcept;
-  /// Adds the radiation of the entity that hides most of the sample's sky in interval j.
-  void add_exitance(std::size_t s, const glm::vec3& normal, std::size_t j,
+  /// Input of sample `s` in interval k of a window, without the fluxes of its partners.
+  [[nodiscard]] SampleDrive drive(std::size_t s, const glm::vec3& normal, const Window& window,
+                                  std::size_t k) const noexcept;
+  /// Adds the radiation of the entity that hides most of the sample's sky.
+  void add_exitance(std::size_t s, const glm::vec3& normal, const Window& window, std::size_t k,
                     SampleDrive& drive) const noexcept;
-  /// Integrates the samples of a group, and the other faces of sheets with them, over the record.
-  void carry(std::size_t group);
-  /// Integrates the samples that have neighbours over the record, all of them interval by interval.
-  /// `first` is the first group of such samples.
-  void march(std::size_t first);
-  /// Advances a group of them over interval j, from model_.states to next_.
-  void march_group(std::size_t group, std::size_t j) noexcept;
-  /// Finds how the neighbours of an interval's end change each other, for a range of `linked()`.
-  void settle(std::size_t from, std::size_t to) noexcept;
-  /// Samples that have neighbours, ascending.
-  [[nodiscard]] std::span<const std::uint32_t> linked() const noexcept {
-    return std::span(swept_).subspan(first_linked_);
+  /// Integrates the samples of a group, and the other faces of sheets with them, over a window.
+  void carry(std::size_t group, const Window& window);
+  /// Input of sample `s` in interval k of a window, with the fluxes of its partners.
+  [[nodiscard]] SampleDrive whole_drive(std::size_t s, const glm::vec3& normal,
+                                        const Window& window, std::size_t k) const noexcept;
+  /// Row of a sample in the window at hand.
+  [[nodiscard]] float* row_of(std::size_t s, const Window& window) noexcept {
+    return &sent_[s * row_size(window.count)];
   }
 
   const SurfaceInputs& in_;
   SurfaceModel& model_;
   SampleHistories histories_;
   std::size_t intervals_;
-  std::size_t nodes_;
-  /// Samples that sweeps change, one for both faces of a sheet: first those without neighbours.
-  std::vector<std::uint32_t> swept_;
-  std::size_t first_linked_ = 0;
-  SentHistory second_;           ///< second rows of the samples that sweeps change
-  std::vector<SentRow> before_;  ///< by sample: what it sent in the latest sweep
-  std::vector<SentRow> after_;   ///< by sample: what it sends in this sweep
+  std::vector<std::uint32_t> swept_;     ///< samples that change; one for both faces of a sheet
+  std::vector<SentRow> rows_;            ///< by sample: what it sent in the latest pass
+  RowStore<float> flux_w_m2_;            ///< fluxes of this pass at every node: rows of partners
+  std::vector<std::uint32_t> flux_row_;  ///< by sample: its row there, or kNoList
+  std::vector<float> sent_;              ///< by sample: its row in the window at hand
+  std::vector<float> shift_w_m2_;        ///< by sample: long wave at the last node above its guess
+  std::vector<SampleState> begin_;       ///< by sample: state at the begin of the window
   SeenRadiation seen_;
   EntityExitance exitance_;
   std::size_t entities_ = 0;         ///< entities whose faces count; 0 without exchange
@@ -229,19 +240,6 @@ class Sweeper {
   std::vector<EntityFaces> before_;  ///< faces of the iteration before
   bool takes_courses_ = false;
   std::optional<BodyCourses> bodies_;
-  /// Column of a sample that has neighbours, in the interval at hand.
-  struct Column {
-    SampleDrive drive;
-    SampleState next;
-    physics::FosterState<double> alone_k{};  ///< lumps at the end of it without neighbours
-    physics::FosterState<double> end_k{};    ///< and with them
-    physics::FosterState<double> made_k{};   ///< change that they made
-    SideHeat side;
-    physics::ColumnModes::Matrix gain{};
-  };
-  std::vector<Column> columns_;           ///< by entry of linked()
-  std::vector<std::uint32_t> column_of_;  ///< by sample
-  std::vector<std::size_t> islands_;      ///< entries of linked() at which another instance begins
 };
 
 Sweeper::Sweeper(const SurfaceInputs& inputs, const ExchangeOptions& options,
@@ -273,25 +271,7 @@ Sweeper::Sweeper(const SurfaceInputs& inputs, const ExchangeOptions& options,
     }
     takes_courses_ = takes_courses_ || takes_course(s);
   }
-  const auto has_none = [&](std::uint32_t s) { return model_.samples.samples[s].link_count == 0; };
-  first_linked_ = static_cast<std::size_t>(std::ranges::stable_partition(swept_, has_none).begin() -
-                                           swept_.begin());
-  columns_.resize(linked().size());
-  column_of_.assign(columns_.empty() ? 0 : before_.size(), 0);
-  std::size_t instance = 0;
-  for (std::size_t i = 0; i < linked().size(); ++i) {
-    column_of_[linked()[i]] = static_cast<std::uint32_t>(i);
-    const bool begins = i == 0 || (instance + 1 < model.first_sample.size() &&
-                                   linked()[i] >= model.first_sample[instance + 1]);
-    if (begins) islands_.push_back(i);
-    while (instance + 1 < model.first_sample.size() &&
-           linked()[i] >= model.first_sample[instance + 1]) {
-      ++instance;
-    }
-  }
-  islands_.push_back(linked().size());
-  bodies_.emplace(model, inputs.geometry, inputs.heat, inputs.record, swept_, first_linked_,
-                  kAdvanceTogether);
+  bodies_.emplace(model, inputs.geometry, inputs.heat, inputs.record, swept_, kAdvanceTogether);
   model.body_k = bodies_->end_k();
 }
 
@@ -330,17 +310,53 @@ void Sweeper::load(const Window& window) {
   });
 }
 
-void Sweeper::sweep() {
-  // Gather the radiation of the sweep before, then integrate every sample that it can change.
-  seen_.gather(before_);
-  const auto groups = bodies_->groups();
-  const auto alone = static_cast<std::size_t>(
-      std::ranges::lower_bound(groups, first_linked_, {}, &BodyCourses::Group::first) -
-      groups.begin());
-  threads::parallel_parts(alone, kGrain, [&](std::size_t from, std::size_t to) {
-    for (std::size_t group = from; group < to; ++group) carry(group);
+void Sweeper::settle(const Window& window) {
+  for (std::uint32_t i = 0; i < kMostIterations; ++i) {
+    const double faces_w_m2 = measure_faces(window);
+    const double seen_w_m2 = seen_.look(sent_);
+    const double left_w_m2 = std::max(faces_w_m2, seen_w_m2);
+    if (!(left_w_m2 > kExchangeResidual_w_m2)) return;
+    if (i + 1 == kMostIterations) {
+      model_.exchange_left_w_m2 = std::max(model_.exchange_left_w_m2, left_w_m2);
+      return;
+    }
+    seen_.take(i >= kPlainIterations);
+    const bool faces_changed = faces_w_m2 > kRenewFrac * kExchangeResidual_w_m2;
+    carry_groups(window, [&](std::uint32_t s) { return changed(s, window, faces_changed); });
+  }
+}
+
+void Sweeper::store(const Window& window) {
+  const std::size_t last = window.first + window.count;
+  threads::parallel_parts(swept_.size(), kGrain * kGrain, [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) {
+      const auto keep = [&](std::uint32_t s) {
+        const float* const row_w_m2 = row_of(s, window);
+        shift_w_m2_[s] = row_w_m2[window.count] - rows_[s].longwave_w_m2(last);
+        for (std::size_t k = 0; k <= window.count; ++k) {
+          rows_[s].keep_longwave(window.first + k, row_w_m2[k]);
+        }
+        for (std::size_t k = 0; k < window.count; ++k) {
+          rows_[s].keep_shortwave(window.first + k, row_w_m2[window.count + 1 + k]);
+        }
+      };
+      const std::uint32_t s = swept_[i];
+      keep(s);
+      const std::uint32_t other = model_.samples.samples[s].other_side;
+      if (other != kNoSample) keep(other);
+      begin_[s] = model_.states[s];
+    }
   });
-  march(alone);
+}
+
+void Sweeper::take_courses() {
+  for (const std::uint32_t s : swept_) {
+    if (flux_row_[s] == kNoList) continue;
+    const std::span<const float> flux_w_m2 = flux_w_m2_.row(flux_row_[s]);
+    for (std::size_t node = 0; node < flux_w_m2.size(); ++node) {
+      rows_[s].keep_flux(node, flux_w_m2[node]);
+    }
+  }
   bodies_->correct();
   model_.body_k = bodies_->end_k();
 }
@@ -369,8 +385,11 @@ double Sweeper::measure_faces(const Window& window) {
 
 bool Sweeper::alone(std::size_t s) const noexcept {
   const SurfaceSample& sample = model_.samples.samples[s];
-  if (sample.seen_count != 0 || sample.body >= 0 || sample.link_count != 0) return false;
-  if (faces_.empty()) return true;
+  if (sample.seen_count != 0 || sample.body >= 0) return false;
+  for (const Partner& partner : sample.partners) {
+    if (partner.sample != kNoSample) return false;
+  }
+  if (entities_ == 0) return true;
   return std::ranges::all_of(histories_.rows[s].hidden_sky,
                              [](const HiddenSky& sky) { return sky.frac == 0.0F; });
 }
@@ -433,130 +452,18 @@ void Sweeper::add_exitance(std::size_t s, const glm::vec3& normal, const Window&
   drive.hidden_is_seen = true;
 }
 
-void Sweeper::march_group(std::size_t group, std::size_t j) noexcept {
-  const BodyCourses::Group& chosen = bodies_->groups()[group];
-  const FosterHeat& foster = *in_.heat.foster();
-  const HeatInterval& interval = in_.record.intervals[j];
-  const std::span<Column> columns =
-      std::span(columns_).subspan(chosen.first - first_linked_, chosen.count);
-  std::array<SampleAdvance, kAdvanceTogether> fronts;
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    const std::uint32_t s = swept_[chosen.first + i];
-    const SurfaceSample& sample = model_.samples.samples[s];
-    Column& column = columns[i];
-    SampleAdvance& front = fronts[i];
-    front.sample = &sample;
-    front.normal = in_.record.rays[j].normal(sample);
-    column.drive = drive(s, front.normal, j);
-    front.drive = column.drive;
-    column.next = model_.states[s];
-    front.state = &column.next;
-    if (j == 0) {
-      after_[s].keep_begin(
-          in_.heat.output(sample, front.normal, interval.forcing.begin, front.drive, column.next));
-      if (chosen.body >= 0) bodies_->add(group, 0, s, column.next);
-    }
+SampleDrive Sweeper::whole_drive(std::size_t s, const glm::vec3& normal, const Window& window,
+                                 std::size_t k) const noexcept {
+  SampleDrive drive = this->drive(s, normal, window, k);
+  const SurfaceSample& sample = model_.samples.samples[s];
+  const std::size_t j = window.first + k;
+  for (std::size_t p = 0; p < kMaxPartners; ++p) {
+    const std::uint32_t partner = sample.partners[p].sample;
+    if (partner == kNoSample) continue;
+    drive.partner_begin_w_m2[p] = rows_[partner].flux_w_m2(j);
+    drive.partner_end_w_m2[p] = rows_[partner].flux_w_m2(j + 1);
   }
-  foster.advance(std::span(fronts).first(columns.size()), interval);
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    Column& column = columns[i];
-    const SurfaceSample& sample = *fronts[i].sample;
-    column.alone_k = foster.lumps_k(sample, column.next, column.drive.body_k);
-    // Begin with the change that the neighbours made in the interval before.
-    for (std::size_t l = 0; l < column.end_k.size(); ++l) {
-      column.end_k[l] = column.alone_k[l] + (j == 0 ? 0.0 : column.made_k[l]);
-    }
-    column.gain = foster.side_gains(sample, interval, column.drive, column.side, column.alone_k[0]);
-  }
-}
-
-void Sweeper::settle(std::size_t from, std::size_t to) noexcept {
-  const auto relax_column = [&](std::size_t i) {
-    const SurfaceSample& sample = model_.samples.samples[linked()[i]];
-    Column& column = columns_[i];
-    physics::FosterState<double> below_k{};
-    for (std::uint32_t k = 0; k < sample.link_count; ++k) {
-      const SideLink& link = model_.samples.links[sample.first_link + k];
-      const physics::FosterState<double>& other_k = columns_[column_of_[link.sample]].end_k;
-      for (std::size_t l = 0; l < below_k.size(); ++l) {
-        below_k[l] += link.conductance_w_m2_k[l] * other_k[l];
-      }
-    }
-    for (std::size_t l = 0; l < below_k.size(); ++l) {
-      const double conductance_w_m2_k = column.side.conductance_w_m2_k[l];
-      column.side.mean_k[l] = conductance_w_m2_k > 0.0 ? below_k[l] / conductance_w_m2_k : 0.0;
-      below_k[l] = conductance_w_m2_k > 0.0 ? column.side.mean_k[l] - column.alone_k[l] : 0.0;
-    }
-    double change_k = 0.0;
-    for (std::size_t l = 0; l < below_k.size(); ++l) {
-      double new_k = column.alone_k[l];
-      for (std::size_t m = 0; m < below_k.size(); ++m) new_k += column.gain[l][m] * below_k[m];
-      change_k = std::max(change_k, std::abs(new_k - column.end_k[l]));
-      column.end_k[l] = new_k;
-    }
-    return change_k;
-  };
-  // Go up and down in turn, each time with the newest temperatures (Gauss and Seidel).
-  for (std::uint32_t round = 0; round < kSettleRounds; ++round) {
-    double change_k = 0.0;
-    for (std::size_t k = from; k < to; ++k) {
-      change_k = std::max(change_k, relax_column(round % 2 == 0 ? k : from + to - 1 - k));
-    }
-    if (change_k < kSettledK) break;
-  }
-}
-
-void Sweeper::march(std::size_t first) {
-  if (columns_.empty()) return;
-  const std::size_t groups = bodies_->groups().size() - first;
-  const FosterHeat& foster = *in_.heat.foster();
-  for (const std::uint32_t s : linked()) {
-    model_.states[s] = histories_.start[s];
-    const SurfaceSample& sample = model_.samples.samples[s];
-    SideHeat& side = columns_[column_of_[s]].side;
-    side = {};
-    for (std::uint32_t k = 0; k < sample.link_count; ++k) {
-      const SideLink& link = model_.samples.links[sample.first_link + k];
-      for (std::size_t l = 0; l < side.mean_k.size(); ++l) {
-        side.conductance_w_m2_k[l] += link.conductance_w_m2_k[l];
-      }
-    }
-  }
-  for (std::size_t j = 0; j < intervals_; ++j) {
-    const HeatInterval& interval = in_.record.intervals[j];
-    threads::parallel_parts(groups, kGrain, [&](std::size_t from, std::size_t to) {
-      for (std::size_t group = from; group < to; ++group) march_group(first + group, j);
-    });
-    threads::parallel_parts(islands_.size() - 1, 1, [&](std::size_t from, std::size_t to) {
-      for (std::size_t k = from; k < to; ++k) settle(islands_[k], islands_[k + 1]);
-    });
-    // Take the temperatures that the neighbours agree on.
-    threads::parallel_parts(groups, kGrain, [&](std::size_t from, std::size_t to) {
-      for (std::size_t group = first + from; group < first + to; ++group) {
-        const BodyCourses::Group& chosen = bodies_->groups()[group];
-        for (std::size_t k = chosen.first; k < chosen.first + chosen.count; ++k) {
-          const std::uint32_t s = swept_[k];
-          const SurfaceSample& sample = model_.samples.samples[s];
-          Column& column = columns_[k - first_linked_];
-          physics::FosterState<double> from_w_m2{};
-          for (std::size_t l = 0; l < from_w_m2.size(); ++l) {
-            column.made_k[l] = column.end_k[l] - column.alone_k[l];
-            from_w_m2[l] =
-                column.side.conductance_w_m2_k[l] * (column.side.mean_k[l] - column.end_k[l]);
-          }
-          const SampleAdvance each{&sample, {}, column.drive, &column.next, nullptr, {}};
-          foster.take_aside(each, interval, from_w_m2, column.made_k[0], column.alone_k[0]);
-          column.drive.longwave_begin_w_m2 = column.drive.longwave_end_w_m2;
-          SampleOutput& output = model_.outputs[s];
-          output = foster.output(sample, in_.record.rays[j].normal(sample), interval.forcing.end,
-                                 column.drive, column.next);
-          model_.states[s] = column.next;
-          after_[s].keep_end(j, output);
-          if (chosen.body >= 0) bodies_->add(group, j + 1, s, column.next);
-        }
-      }
-    });
-  }
+  return drive;
 }
 
 void Sweeper::carry(std::size_t group, const Window& window) {
@@ -602,7 +509,7 @@ void Sweeper::carry(std::size_t group, const Window& window) {
       const std::uint32_t s = samples[i];
       SampleAdvance& front = fronts[i];
       front.normal = in_.record.rays[j].normal(*front.sample);
-      front.drive = drive(s, front.normal, j);
+      front.drive = whole_drive(s, front.normal, window, k);
       const bool first = j == 0;
       if (first) {
         add_to_body(i, 0, states[i]);
@@ -655,10 +562,11 @@ SampleHistories take_histories(const SurfaceInputs& inputs, std::vector<SurfaceP
   out.start.resize(count);
   model.states.resize(count);
   model.outputs.resize(count);
-  // Go through the patches.
+  // Go through the patches. The partners' patch follows the drawn samples.
   for (std::size_t p = 0; p < out.patches.size(); ++p) {
     SurfacePatch& patch = out.patches[p];
-    const std::size_t first = model.first_sample[p];
+    const std::size_t first =
+        p < model.first_sample.size() ? model.first_sample[p] : model.drawn_samples;
     const bool keeps = patch.sent.length() != 0;
     const auto rows_of = [](SurfacePatch& side, std::size_t vertex) {
       return SampleHistories::Rows{side.sun_frac.row(vertex), side.hidden_sky.row(vertex),
@@ -677,11 +585,16 @@ SampleHistories take_histories(const SurfaceInputs& inputs, std::vector<SurfaceP
     }
     patch.free_all_but_rows();
   }
-  // Samples beside an edge start with the lumps that their columns still have.
-  if (const FosterHeat* foster = inputs.heat.foster(); foster != nullptr) {
-    for (std::size_t s = 0; s < count; ++s) {
-      foster->cut(model.samples.samples[s], out.start[s]);
-      foster->cut(model.samples.samples[s], model.states[s]);
+  // Start the modes that a partner drives like that partner's own modes, with the weight of its
+  // flux (physics.md eq. 22).
+  for (std::size_t s = 0; s < count; ++s) {
+    for (std::size_t p = 0; p < kMaxPartners; ++p) {
+      const Partner& partner = model.samples.samples[s].partners[p];
+      if (partner.sample == kNoSample) continue;
+      for (std::size_t m = 0; m < physics::kMaxFosterModes; ++m) {
+        out.start[s].partner_k[p][m] =
+            partner.weight_frac[m] * out.start[partner.sample].modes_k[m];
+      }
     }
   }
   return out;

@@ -49,10 +49,9 @@ struct FosterMaterial {
   double base_k = 0.0;
   double initial_k = 0.0;
   double prescribed_k = 0.0;
-  bool sheet = false;  ///< driven by the mean of the fluxes that its two faces receive
-  bool body = false;   ///< the base is the interior of a body, which starts at base_k
-  /// Layers that conduct sideways; empty for sheets and for prescribed temperatures.
-  std::vector<physics::StackLayer> layers;
+  double roughness = 1.0;  ///< factor of the forced part of the film (physics.md eq. 34)
+  bool sheet = false;      ///< driven by the mean of the fluxes that its two faces receive
+  bool body = false;       ///< the base is the interior of a body, which starts at base_k
   physics::FosterState<double> base_shares{};  ///< shares c_i of the modes in a change of the base
 
   [[nodiscard]] bool prescribed() const noexcept { return network.count == 0; }

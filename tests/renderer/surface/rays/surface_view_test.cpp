@@ -288,5 +288,76 @@ TEST(SurfaceView, an_entity_is_seen_where_it_stands) {
   EXPECT_EQ(sampler.view(casters, {}, {true, {&placement, 1}}).sky_frac, 1.0F);
 }
 
+AdjacentFaces adjacent_of(const CasterRays& casters, ViewPoint point, float reach_m) {
+  point.position_m -= glm::vec3(casters.origin_world_m());
+  return adjacent_faces(casters, point, reach_m, {});
+}
+
+TEST(AdjacentFaces, of_a_cube_are_those_within_reach) {
+  SurfaceScene scene;
+  scene.add_static(ground());
+  scene.add_static(test::box_mesh(glm::vec3(0.0F, 0.0F, 1.0F), glm::vec3(2.0F, 2.0F, 3.0F)));
+  const CasterRays casters = rays_of(scene);
+  // The point is 0.2 m from the edge with -x and 0.3 m from that with +y.
+  const ViewPoint point{.position_m = {0.2F, 1.7F, 3.0F}};
+  AdjacentFaces faces = adjacent_of(casters, point, 0.25F);
+  ASSERT_EQ(faces.count, 1U);
+  EXPECT_LT(glm::distance(faces.faces[0].normal, glm::vec3(-1.0F, 0.0F, 0.0F)), 1e-6F);
+  EXPECT_NEAR(faces.faces[0].distance_m, 0.2F, 1e-5F);
+  faces = adjacent_of(casters, point, 0.5F);
+  ASSERT_EQ(faces.count, 2U);
+  EXPECT_LT(glm::distance(faces.faces[1].normal, glm::vec3(0.0F, 1.0F, 0.0F)), 1e-6F);
+  EXPECT_NEAR(faces.faces[1].distance_m, 0.3F, 1e-5F);
+  EXPECT_EQ(adjacent_of(casters, {.position_m = {1.0F, 1.0F, 3.0F}}, 0.5F).count, 0U);
+  EXPECT_EQ(adjacent_of(casters, {.position_m = {9.0F, 9.0F, 0.0F}}, 0.5F).count, 0U);
+
+  // A vertex of the top face at its corner touches both sides.
+  const ViewPoint corner{.position_m = {2.0F, 0.0F, 3.0F},
+                         .inward = glm::normalize(glm::vec3(-1.0F, 1.0F, 0.0F))};
+  faces = adjacent_of(casters, corner, 0.1F);
+  ASSERT_EQ(faces.count, 2U);
+  EXPECT_NEAR(faces.faces[0].distance_m, 0.0F, 1e-5F);
+  EXPECT_NEAR(faces.faces[1].distance_m, 0.0F, 1e-5F);
+  EXPECT_NEAR(glm::dot(faces.faces[0].normal, faces.faces[1].normal), 0.0F, 1e-6F);
+}
+
+TEST(AdjacentFaces, of_a_rod_are_both_sides_but_not_the_back) {
+  SurfaceScene scene;
+  scene.add_entity(test::box_mesh(glm::vec3(-0.05F, -1.0F, -0.05F), glm::vec3(0.05F, 1.0F, 0.05F)));
+  const CasterRays casters = rays_of(scene);
+  const EntityPlacement in_body;
+  const ViewPoint point{.position_m = {0.01F, 0.0F, 0.05F}};
+  const AdjacentFaces faces = adjacent_faces(casters, point, 0.1F, {false, {&in_body, 1}});
+  ASSERT_EQ(faces.count, 2U);
+  EXPECT_NEAR(faces.faces[0].distance_m, 0.04F, 1e-6F);
+  EXPECT_NEAR(faces.faces[0].normal.x, 1.0F, 1e-6F);
+  EXPECT_NEAR(faces.faces[1].distance_m, 0.06F, 1e-6F);
+  EXPECT_NEAR(faces.faces[1].normal.x, -1.0F, 1e-6F);
+}
+
+TEST(AdjacentFaces, gentle_creases_have_none_and_a_round_side_is_one) {
+  // The prism has 32 sides and 1 m in radius and height: its top is one face, its mantle round.
+  SurfaceScene scene;
+  scene::Mesh prism;
+  constexpr int kSides = 32;
+  const auto at = [](int i, float z_m) {
+    const double angle_rad = 2.0 * physics::kPi * i / kSides;
+    return glm::vec3(std::cos(angle_rad), std::sin(angle_rad), z_m);
+  };
+  for (int i = 0; i < kSides; ++i) {
+    test::add_quad(prism, {at(i, 0.0F), at(i + 1, 0.0F), at(i + 1, 1.0F), at(i, 1.0F)});
+    test::add_quad(prism, {glm::vec3(0.0F, 0.0F, 1.0F), at(i, 1.0F),
+                           0.5F * (at(i, 1.0F) + at(i + 1, 1.0F)), at(i + 1, 1.0F)});
+  }
+  scene.add_static(prism);
+  const CasterRays casters = rays_of(scene);
+  const ViewPoint on_mantle{.position_m = 0.5F * (at(0, 0.5F) + at(1, 0.5F)),
+                            .normal = glm::normalize(glm::vec3(at(0, 0.0F) + at(1, 0.0F)))};
+  EXPECT_EQ(adjacent_of(casters, on_mantle, 0.3F).count, 0U);
+  const AdjacentFaces rim = adjacent_of(casters, {.position_m = {0.97F, 0.0F, 1.0F}}, 0.1F);
+  EXPECT_EQ(rim.count, 1U);
+  EXPECT_NEAR(rim.faces[0].distance_m, 0.025F, 0.01F);
+}
+
 }  // namespace
 }  // namespace emit::renderer

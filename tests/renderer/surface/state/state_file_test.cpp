@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -67,18 +66,14 @@ struct World {
       sample.open_frac[2] = number();
       sample.open_before_frac[3] = number();
       sample.flat_m = number();
-      sample.first_link = i;
-      sample.link_count = 1;
-      sample.cut = static_cast<std::uint8_t>(i % (kColumnCuts + 1));
+      sample.partners[1] = {i, number(), {number(), number(), number(), number()}};
       model.samples.samples.push_back(sample);
       model.samples.seen.push_back({count - 1 - i, number()});
-      const auto size = [&number] { return std::abs(number()); };
-      model.samples.links.push_back({count - 1 - i, {size(), size(), size(), size()}});
       SampleState state;
       state.modes_k[1] = number();
-      state.modes_k[3] = number();
+      state.partner_k[1][3] = number();
       model.states.push_back(state);
-      model.outputs.push_back({number(), number(), number(), number()});
+      model.outputs.push_back({number(), number(), number(), number(), number()});
     }
     std::vector<float> value_k(model.drawn_samples);
     for (float& value : value_k) value = number();
@@ -180,16 +175,17 @@ TEST_F(StateFile, gives_back_what_was_written_and_leaves_nothing_beside_it) {
     EXPECT_EQ(a.seen_count, b.seen_count);
     EXPECT_EQ(a.seen_scale, b.seen_scale);
     EXPECT_EQ(a.flat_m, b.flat_m);
-    EXPECT_EQ(a.first_link, b.first_link);
-    EXPECT_EQ(a.link_count, b.link_count);
-    EXPECT_EQ(a.cut, b.cut);
+    EXPECT_EQ(a.partners[0].sample, kNoSample);
+    EXPECT_EQ(a.partners[1].sample, b.partners[1].sample);
+    EXPECT_EQ(a.partners[1].distance_m, b.partners[1].distance_m);
+    EXPECT_EQ(a.partners[1].weight_frac, b.partners[1].weight_frac);
     EXPECT_EQ(got->states[i].modes_k, model.states[i].modes_k);
+    EXPECT_EQ(got->states[i].partner_k, model.states[i].partner_k);
     EXPECT_EQ(got->outputs[i].offset_k, model.outputs[i].offset_k);
     EXPECT_EQ(got->outputs[i].sun_frac, model.outputs[i].sun_frac);
     EXPECT_EQ(got->outputs[i].longwave_out_w_m2, model.outputs[i].longwave_out_w_m2);
     EXPECT_EQ(got->outputs[i].shortwave_out_w_m2, model.outputs[i].shortwave_out_w_m2);
-    EXPECT_EQ(got->samples.links[i].sample, model.samples.links[i].sample);
-    EXPECT_EQ(got->samples.links[i].conductance_w_m2_k, model.samples.links[i].conductance_w_m2_k);
+    EXPECT_EQ(got->outputs[i].flux_w_m2, model.outputs[i].flux_w_m2);
     EXPECT_EQ(got->samples.seen[i].sample, model.samples.seen[i].sample);
     EXPECT_EQ(got->samples.seen[i].weight_frac, model.samples.seen[i].weight_frac);
   }
@@ -316,10 +312,10 @@ TEST_F(StateFile, huge_counts_and_indices_out_of_range_are_refused_though_the_ch
     for (const SurfaceSample& sample : got->samples.samples) {
       ASSERT_LE(sample.first_seen + sample.seen_count, got->samples.seen.size());
       ASSERT_LT(sample.entity, static_cast<std::int32_t>(kEntities));
-      ASSERT_LE(sample.first_link + sample.link_count, got->samples.links.size());
-      ASSERT_LE(sample.cut, kColumnCuts);
+      for (const Partner& partner : sample.partners) {
+        ASSERT_TRUE(partner.sample == kNoSample || partner.sample < count);
+      }
     }
-    for (const SideLink& link : got->samples.links) ASSERT_LT(link.sample, count);
     for (const SeenSample& seen : got->samples.seen) ASSERT_LT(seen.sample, count);
     for (const std::uint32_t v : got->drawn[0].indices) ASSERT_LT(v, got->drawn_samples);
     for (const scene::Cluster& cluster : got->drawn[0].levels.clusters) {
