@@ -111,7 +111,8 @@ class SeenRadiation {
     return sample.seen_count != 0 && renewed_[list_of_entry_[sample.first_seen]] != 0;
   }
 
-  /// What a sample receives: a row, and the factor on it. The row is empty if it sees nothing.
+  /// The type holds what a sample receives: a row, and the factor on it. The row is empty if the
+  /// sample sees nothing.
   struct Received {
     std::span<const float> row_w_m2;
     double scale = 0.0;
