@@ -2,7 +2,7 @@
 #ifndef EMIT_LIB_AIR_VIEW
 #define EMIT_LIB_AIR_VIEW
 
-// Air of the built-in model around a sensor (physics.md eq. 28). Twin of emit/physics/air_view.hpp, which makes the
+// Air of the built-in model around a sensor (physics.md eq. 39). Twin of emit/physics/air_view.hpp, which makes the
 // tables and evaluates them on the CPU.
 // The including shader defines EMIT_AIR_VIEW(index), the node at that place of its buffer, a vec4. `first` is the index
 // of the first node of a table.

@@ -10,8 +10,8 @@
 #include "emit/physics/error.hpp"
 
 /// Air of the model atmospheres in the built-in bands: transmittance and thermal path radiance
-/// between two heights, the clear sky by elevation, and the sun at a height (physics.md eq. 26 and
-/// 27). Absorbers are added up along the path; each band is a sum of exponential terms in their
+/// between two heights, the clear sky by elevation, and the sun at a height (physics.md eq. 37 and
+/// 38). Absorbers are added up along the path; each band is a sum of exponential terms in their
 /// amounts. Clouds, rain and scattered sunlight are not part of it.
 /// Any thread after construction.
 namespace emit::physics {

@@ -7,7 +7,7 @@
 
 #include "emit/physics/air_model.hpp"
 
-/// The air model as the shader reads it: a small table around the sensor (physics.md eq. 28). The
+/// The air model as the shader reads it: a small table around the sensor (physics.md eq. 39). The
 /// shader evaluates the same equations in float32 (shaders/lib/air_view.glsl).
 namespace emit::physics {
 
