@@ -206,7 +206,8 @@ physics::Result<std::vector<FosterMaterial>> foster_materials(
     }
     entry.body = material.rests_on_body();
     if (entry.body) entry.base_shares = physics::base_shares(layers, entry.network);
-    out.push_back(entry);
+    entry.layers = std::move(layers);
+    out.push_back(std::move(entry));
   }
   return out;
 }

@@ -14,9 +14,6 @@ using physics::FosterDrive;
 using physics::FosterState;
 using physics::FosterSurface;
 
-/// Weights of modes that take the whole flux.
-constexpr std::array<float, physics::kMaxFosterModes> kWhole{1.0F, 1.0F, 1.0F, 1.0F};
-
 /// Adds all modes, in a fixed order.
 double sum(const FosterState<double>& x) noexcept {
   return (x[0] + x[1]) + (x[2] + x[3]);
@@ -28,15 +25,10 @@ double exitance_w_m2(double temperature_k) noexcept {
   return physics::kStefanBoltzmannWPerM2K4 * t2 * t2;
 }
 
-/// Advances states under a flux that goes linearly from `begin` to `end`. The result is exact
-/// (physics.md eq. 6). Mode i takes the share `weight_frac[i]` of the flux.
-void relax(FosterState<double>& x, const FosterSurface<double>& surface,
-           const std::array<float, physics::kMaxFosterModes>& weight_frac, double begin_w_m2,
-           double end_w_m2, const physics::FosterGains<double>& gains) noexcept {
+/// Lets states decay without any flux (physics.md eq. 6).
+void relax(FosterState<double>& x, const physics::FosterGains<double>& gains) noexcept {
   for (std::size_t i = 0; i < physics::kMaxFosterModes; ++i) {
-    const double r = surface.resistance_m2k_w[i] * weight_frac[i];
-    x[i] +=
-        (r * begin_w_m2 - x[i]) * gains.start_frac[i] + (r * end_w_m2 - x[i]) * gains.end_frac[i];
+    x[i] -= x[i] * (gains.start_frac[i] + gains.end_frac[i]);
   }
 }
 
@@ -50,6 +42,8 @@ FosterHeat::FosterHeat(std::span<const FosterMaterial> materials, double referen
   for (const FosterMaterial& material : materials_) {
     surfaces_.push_back(physics::foster_surface(material.network, material.emissivity_frac,
                                                 material.base_k, reference_k));
+    cells_.push_back(material.layers.empty() ? physics::ColumnCells{}
+                                             : physics::column_cells(material.layers));
   }
 }
 
@@ -153,9 +147,8 @@ FosterDrive<double> FosterHeat::absorbed(std::uint32_t material, const FilmDrive
   return drive;
 }
 
-SampleOutput FosterHeat::output_of(const SurfaceSample& sample, const FilmDrive& film,
-                                   const Incoming& in, const SampleDrive& drive,
-                                   const PartHeat& part, double offset_k) const noexcept {
+SampleOutput FosterHeat::output_of(const SurfaceSample& sample, const Incoming& in,
+                                   const SampleDrive& drive, double offset_k) const noexcept {
   const FosterMaterial& m = materials_[sample.material];
   SampleOutput out;
   out.offset_k = static_cast<float>(offset_k);
@@ -165,34 +158,147 @@ SampleOutput FosterHeat::output_of(const SurfaceSample& sample, const FilmDrive&
       static_cast<float>(m.emissivity_frac * exitance_w_m2(reference_k_ + offset_k) +
                          (1.0 - m.emissivity_frac) * in.longwave_w_m2);
   out.shortwave_out_w_m2 = static_cast<float>((1.0 - m.solar_absorptance_frac) * in.shortwave_w_m2);
-  // Give the net flux to partners, which it drives. A covered face has none.
-  if (!m.prescribed() && !sample.covered) {
-    out.flux_w_m2 = static_cast<float>(physics::foster_flux_w_m2(
-        offset_k, absorbed(sample.material, film, in, part), surfaces_[sample.material]));
-  }
   return out;
 }
 
 double FosterHeat::offset_k(std::uint32_t material, const SampleState& state) const noexcept {
   if (materials_[material].prescribed()) return materials_[material].prescribed_k - reference_k_;
-  // Add the modes of the sample and those that its partners drive (physics.md eq. 22).
-  double offset_k = physics::foster_offset_k(state.modes_k, surfaces_[material]);
-  for (const FosterState<double>& partner : state.partner_k) offset_k += sum(partner);
-  return offset_k;
+  return physics::foster_offset_k(state.modes_k, surfaces_[material]) + state.aside_k();
 }
 
 SampleOutput FosterHeat::output(const SurfaceSample& sample, const glm::vec3& normal,
                                 const SurfaceForcing& forcing, const SampleDrive& drive,
                                 const SampleState& state) const noexcept {
   const Incoming in = incoming(sample, normal, forcing, drive, drive.longwave_begin_w_m2);
-  const double offset = offset_k(sample.material, state);
-  const EntityAir* air = drive.air;
-  FilmDrive film;
-  film.air_k = air != nullptr ? air->begin_air_k : forcing.air_k;
-  film.film_w_m2_k = physics::film_w_m2_k(air != nullptr ? air->begin : forcing.film,
-                                          glm::dvec3(normal), materials_[sample.material].roughness,
-                                          reference_k_ + offset - film.air_k);
-  return output_of(sample, film, in, drive, drive.part.begin, offset);
+  return output_of(sample, in, drive, offset_k(sample.material, state));
+}
+
+void FosterHeat::begin_column(const SurfaceSample& sample, SampleState& state) const noexcept {
+  const physics::ColumnCells& cells = cells_[sample.material];
+  const physics::FosterNetwork& network = materials_[sample.material].network;
+  // Take the slowest mode for the mean flux of the time before, whose profile is a line.
+  const std::size_t slowest = network.count - 1;
+  const double flux_w_m2 = state.modes_k[slowest] / network.modes[slowest].resistance_m2k_w;
+  double below_m2k_w = 0.0;
+  for (std::size_t l = cells.count; l-- > 0;) {
+    const double offset_k = surfaces_[sample.material].base_offset_k +
+                            flux_w_m2 * (below_m2k_w + 0.5 * cells.resistance_m2k_w[l]);
+    state.cells_k[l] = state.alone_k[l] = static_cast<float>(offset_k);
+    below_m2k_w += cells.resistance_m2k_w[l];
+  }
+}
+
+double FosterHeat::losses_w_m2_k(const SampleAdvance& each, const HeatInterval& interval,
+                                 const FilmDrive& film) const noexcept {
+  const SurfaceSample& sample = *each.sample;
+  if (sample.covered) return 0.0;
+  const double t_k = reference_k_ + offset_k(sample.material, *each.state);
+  const double slope_w_m2_k = 4.0 * surfaces_[sample.material].emission_w_m2_k4 * t_k * t_k * t_k +
+                              film.film_w_m2_k + each.drive.part.end.contact_w_m2_k;
+  // The modes answer to a warmer surface too: they take up less.
+  const physics::FosterGains<double>& gains = interval.ladders[sample.material].level[0];
+  double answer_m2k_w = 0.0;
+  for (std::size_t i = 0; i < physics::kMaxFosterModes; ++i) {
+    answer_m2k_w += surfaces_[sample.material].resistance_m2k_w[i] * gains.end_frac[i];
+  }
+  return slope_w_m2_k / (1.0 + slope_w_m2_k * answer_m2k_w);
+}
+
+ColumnEquations FosterHeat::column_equations(const SampleAdvance& each,
+                                             const HeatInterval& interval,
+                                             const FilmDrive& film) const noexcept {
+  const SurfaceSample& sample = *each.sample;
+  const SampleColumn& column = *each.drive.aside.column;
+  const physics::ColumnCells& cells = cells_[sample.material];
+  const double per_s = 1.0 / interval.forcing.dt_s;
+  const double base_k =
+      sample.body >= 0 ? each.drive.body_k : surfaces_[sample.material].base_offset_k;
+  ColumnEquations out;
+  out.count = cells.count;
+  // Advance the cells as they are alone: their surface has the temperature of the modes.
+  physics::CellState<double> diagonal{};
+  physics::CellState<double> right{};
+  for (std::size_t l = 0; l < cells.count; ++l) {
+    const double below = cells.below_w_m2_k(l);
+    diagonal[l] += cells.heat_j_m2_k[l] * per_s + below;
+    right[l] += cells.heat_j_m2_k[l] * per_s * each.state->alone_k[l];
+    out.below_w_m2_k[l] = below;
+    if (l + 1 < cells.count) {
+      diagonal[l + 1] += below;
+    } else {
+      right[l] += below * base_k;
+    }
+  }
+  if (!sample.covered) {
+    diagonal[0] += cells.surface_w_m2_k();
+    right[0] += cells.surface_w_m2_k() *
+                physics::foster_offset_k(each.state->modes_k, surfaces_[sample.material]);
+  }
+  out.alone_k = solve_column(cells.count, diagonal, out.below_w_m2_k, right);
+  double into_w_m2 = 0.0;
+  if (!sample.covered) {
+    const double next_k = cells.count > 1 ? out.alone_k[1] : base_k;
+    into_w_m2 = cells.heat_j_m2_k[0] * per_s * (out.alone_k[0] - each.state->alone_k[0]) +
+                cells.below_w_m2_k(0) * (out.alone_k[0] - next_k);
+  }
+  // Give the same flux to the cells with neighbours. Where these make the surface warmer than was
+  // expected, it takes up less.
+  const double losses_w_m2_k = this->losses_w_m2_k(each, interval, film);
+  out.diagonal_w_m2_k[0] += losses_w_m2_k;
+  const double expected_k = each.state->aside_k() + each.drive.aside.change_k;
+  out.right_w_m2[0] += into_w_m2 + losses_w_m2_k * (out.alone_k[0] + expected_k);
+  for (std::size_t l = 0; l < cells.count; ++l) {
+    const double held_w_m2_k = cells.heat_j_m2_k[l] * column.share_frac[l] * per_s;
+    const double below = column.below_w_m2_k[l];
+    out.diagonal_w_m2_k[l] += held_w_m2_k + below;
+    out.right_w_m2[l] += held_w_m2_k * each.state->cells_k[l];
+    out.below_w_m2_k[l] = below;
+    if (l + 1 < cells.count) {
+      out.diagonal_w_m2_k[l + 1] += below;
+    } else {
+      out.right_w_m2[l] += below * base_k;
+    }
+  }
+  return out;
+}
+
+BesideColumn FosterHeat::beside(const SurfaceSamples& all, const SampleColumn& column,
+                                std::span<const SampleState> states) const noexcept {
+  BesideColumn out;
+  const physics::CellState<float>& own_k = states[column.sample].cells_k;
+  for (std::size_t l = 0; l < physics::kMaxColumnCells; ++l) {
+    for (std::uint32_t k = column.first_link[l]; k < column.first_link[l + 1]; ++k) {
+      const CellLink& link = all.links[k];
+      out.conductance_w_m2_k[l] += link.conductance_w_m2_k;
+      out.mean_k[l] +=
+          link.conductance_w_m2_k * states[all.columns[link.column].sample].cells_k[link.cell];
+    }
+    if (!(out.conductance_w_m2_k[l] > 0.0)) continue;
+    // Neighbours move towards the cell while it moves towards them, so that they meet half way:
+    // twice the conductance leads to the middle between both. Closely coupled cells would take each
+    // other's temperature in turn without it.
+    out.mean_k[l] = 0.5 * (own_k[l] + out.mean_k[l] / out.conductance_w_m2_k[l]);
+    out.conductance_w_m2_k[l] *= 2.0;
+  }
+  return out;
+}
+
+void FosterHeat::conduct_aside(const SampleAdvance& each, const HeatInterval& interval,
+                               const FilmDrive& film) const noexcept {
+  const ColumnDrive& aside = each.drive.aside;
+  if (aside.beside == nullptr && aside.equations == nullptr) return;
+  ColumnEquations equations = column_equations(each, interval, film);
+  if (aside.equations != nullptr) {
+    *aside.equations = equations;
+    return;
+  }
+  for (std::size_t l = 0; l < equations.count; ++l) {
+    equations.diagonal_w_m2_k[l] += aside.beside->conductance_w_m2_k[l];
+    equations.right_w_m2[l] += aside.beside->conductance_w_m2_k[l] * aside.beside->mean_k[l];
+  }
+  const physics::CellState<double> cells_k = solve_column(
+      equations.count, equations.diagonal_w_m2_k, equations.below_w_m2_k, equations.right_w_m2);
+  keep_cells(equations.alone_k, cells_k, *each.state);
 }
 
 bool FosterHeat::begin_advance(const SampleAdvance& each, const HeatInterval& interval,
@@ -209,7 +315,6 @@ bool FosterHeat::begin_advance(const SampleAdvance& each, const HeatInterval& in
   const Incoming body_end = into_body(end, sample.covered, each.normal, forcing.end, each.back,
                                       &SampleDrive::longwave_end_w_m2);
   lane.ladder = &interval.ladders[sample.material];
-  const physics::FosterGains<double>& gains = lane.ladder->level[0];
   // Reduce the resistances at the foot of a solid (physics.md eq. 23).
   FosterSurface<double>& surface = lane.surface;
   surface = surfaces_[sample.material];
@@ -217,19 +322,14 @@ bool FosterHeat::begin_advance(const SampleAdvance& each, const HeatInterval& in
   for (std::size_t i = 0; i < physics::kMaxFosterModes; ++i) {
     surface.resistance_m2k_w[i] *= sample.open_frac[i];
   }
-  // Advance the modes that the partners drive. They shift the temperature above which the own flux
-  // acts, so their mean over the interval is added to the base.
-  for (std::size_t p = 0; p < kMaxPartners; ++p) {
-    if (sample.partners[p].sample == kNoSample) continue;
-    FosterState<double>& partner_k = each.state->partner_k[p];
-    const double before_k = sum(partner_k);
-    relax(partner_k, surface, sample.partners[p].weight_frac, drive.partner_begin_w_m2[p],
-          drive.partner_end_w_m2[p], gains);
-    surface.base_offset_k += 0.5 * (before_k + sum(partner_k));
+  // Heat from neighbours shifts the temperature above which the own flux acts. Its mean over
+  // the interval is added to the base.
+  if (sample.column != kNoSample) {
+    surface.base_offset_k += each.state->aside_k() + 0.5 * drive.aside.change_k;
   }
-  // Let the own modes decay without any flux if all faces are covered.
+  // Let the modes decay without any flux if all faces are covered.
   if (sample.covered && (each.back == nullptr || each.back->sample.covered)) {
-    relax(each.state->modes_k, surface, kWhole, 0.0, 0.0, gains);
+    relax(each.state->modes_k, lane.ladder->level[0]);
     return false;
   }
   lane.x = &each.state->modes_k;
@@ -291,8 +391,9 @@ void FosterHeat::advance_group(std::span<SampleAdvance> group,
   for (std::size_t i = 0; i < group.size(); ++i) {
     SampleAdvance& each = group[i];
     count_from_body(each, 1.0);
-    each.output = output_of(*each.sample, end_films[i], ends[i], each.drive, each.drive.part.end,
-                            offset_k(each.sample->material, *each.state));
+    if (each.drive.aside.column != nullptr) conduct_aside(each, interval, end_films[i]);
+    each.output =
+        output_of(*each.sample, ends[i], each.drive, offset_k(each.sample->material, *each.state));
   }
 }
 

@@ -21,7 +21,7 @@ struct BaseConductance {
 };
 
 /// Extended thermal model on samples: surface balance, flux-driven states, radiation of other
-/// samples and conduction across edges (physics.md eq. 16-18, 20, 22).
+/// samples and conduction along the surface (physics.md eq. 16-18, 20, 22).
 /// Immutable after construction; any thread; RT-safe except for the constructor and size().
 class FosterHeat {
  public:
@@ -71,6 +71,19 @@ class FosterHeat {
   [[nodiscard]] double into_base_w_m2(std::uint32_t material,
                                       const SampleState& state) const noexcept;
 
+  /// Cells of the stacks of a material; none where heat moves straight down alone: in sheets and in
+  /// prescribed temperatures.
+  [[nodiscard]] const physics::ColumnCells& cells(std::uint32_t material) const noexcept {
+    return cells_[material];
+  }
+  /// Fills the cells of a state at the start of the history from its modes: a steady profile with
+  /// the flux of the slowest one.
+  void begin_column(const SurfaceSample& sample, SampleState& state) const noexcept;
+  /// Returns what the cells of a column meet beside them over an interval that all begin in
+  /// `states`.
+  [[nodiscard]] BesideColumn beside(const SurfaceSamples& all, const SampleColumn& column,
+                                    std::span<const SampleState> states) const noexcept;
+
   /// Returns the output of a sample in this state; see SampleHeat::output().
   SampleOutput output(const SurfaceSample& sample, const glm::vec3& normal,
                       const SurfaceForcing& forcing, const SampleDrive& drive,
@@ -113,12 +126,23 @@ class FosterHeat {
     FilmDrive begin;
     FilmDrive end;
   };
-  /// Advances what a sample does not share with others: modes that its partners drive, and the own
-  /// modes of a covered one. If the surface balance drives its own modes, it returns true and fills
-  /// `lane`. `end` is what arrives at the face at the end of the interval.
+  /// Fills `lane` and returns true if the surface balance drives the modes of a sample; it advances
+  /// those of a covered one. `end` is what arrives at the face at the end of the interval.
   [[nodiscard]] bool begin_advance(const SampleAdvance& each, const HeatInterval& interval,
                                    const Incoming& end, const FilmSpan& film,
                                    physics::FosterLane& lane) const noexcept;
+  /// Returns by how much the flux into a surface falls per kelvin that neighbours add at the end of
+  /// an interval, W m-2 K-1.
+  [[nodiscard]] double losses_w_m2_k(const SampleAdvance& each, const HeatInterval& interval,
+                                     const FilmDrive& film) const noexcept;
+  /// Returns the equations of a column over an interval. The state has its cells at the begin and
+  /// its modes at the end.
+  [[nodiscard]] ColumnEquations column_equations(const SampleAdvance& each,
+                                                 const HeatInterval& interval,
+                                                 const FilmDrive& film) const noexcept;
+  /// Does with the column of a sample what its drive asks for.
+  void conduct_aside(const SampleAdvance& each, const HeatInterval& interval,
+                     const FilmDrive& film) const noexcept;
   /// Counts the modes of a sample on a body from its interior (`sign` = -1), or from the base of
   /// its material again (+1), physics.md eq. 27. Returns how much warmer the interior is than that
   /// base.
@@ -135,15 +159,15 @@ class FosterHeat {
                                                       const Incoming& in,
                                                       const PartHeat& part) const noexcept;
   /// Returns the output of a sample of known temperature.
-  [[nodiscard]] SampleOutput output_of(const SurfaceSample& sample, const FilmDrive& film,
-                                       const Incoming& in, const SampleDrive& drive,
-                                       const PartHeat& part, double offset_k) const noexcept;
-  /// Returns the surface temperature as an offset from the reference temperature, partners
-  /// included.
+  [[nodiscard]] SampleOutput output_of(const SurfaceSample& sample, const Incoming& in,
+                                       const SampleDrive& drive, double offset_k) const noexcept;
+  /// Returns the surface temperature as an offset from the reference temperature, with the heat of
+  /// neighbours.
   [[nodiscard]] double offset_k(std::uint32_t material, const SampleState& state) const noexcept;
 
   std::vector<FosterMaterial> materials_;
   std::vector<physics::FosterSurface<double>> surfaces_;
+  std::vector<physics::ColumnCells> cells_;  ///< by material; none where heat moves straight down
   double reference_k_ = 0.0;
   double tolerance_k_ = 0.0;
 };

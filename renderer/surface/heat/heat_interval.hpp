@@ -13,6 +13,7 @@
 #include "emit/renderer/surface_forcing.hpp"
 #include "history/entity_air.hpp"
 #include "history/part_history.hpp"
+#include "surface/heat/column_equations.hpp"
 #include "surface/heat/surface_samples.hpp"
 
 namespace emit::renderer {
@@ -57,6 +58,23 @@ struct EntityForcing {
   }
 };
 
+/// Cells with which those of a column exchange heat over an interval, by cell of the column
+/// (physics.md eq. 22).
+struct BesideColumn {
+  physics::CellState<double> conductance_w_m2_k{};  ///< sum over them
+  physics::CellState<double>
+      mean_k{};  ///< their mean by conductance, from the reference temperature
+};
+/// The type says how a step treats the column of a sample. Without `beside` and `equations` it
+/// leaves the cells as they are.
+struct ColumnDrive {
+  const SampleColumn* column = nullptr;
+  const BesideColumn* beside = nullptr;  ///< the cells advance with these neighbours
+  ColumnEquations* equations = nullptr;  ///< filled, for neighbours that are to be found together
+  /// Expected change over the interval of what neighbours add to the surface temperature.
+  double change_k = 0.0;
+};
+
 /// Input of one sample over one interval, in addition to the forcing that all samples share.
 struct SampleDrive {
   float sun_frac = 0.0F;  ///< visible share of the sun's disc, mean over the interval
@@ -73,10 +91,7 @@ struct SampleDrive {
   /// Temperature of the interior of the sample's body, mean over the interval, from the reference
   /// temperature. It counts if the sample has a body.
   double body_k = 0.0;
-  /// Net fluxes into the faces of the partners at the begin and the end of the interval (physics.md
-  /// eq. 22).
-  std::array<double, kMaxPartners> partner_begin_w_m2{};
-  std::array<double, kMaxPartners> partner_end_w_m2{};
+  ColumnDrive aside;
   /// Heat of the part that the sample belongs to (physics.md eq. 29).
   PartHeatSpan part;
   /// Air past the sample's entity, in the forcing of the interval. Null: the air of the scenery.

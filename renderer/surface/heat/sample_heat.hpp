@@ -69,6 +69,10 @@ class SampleHeat {
     const auto* foster = std::get_if<FosterHeat>(&model_);
     return foster != nullptr && foster->has_bodies();
   }
+  /// The extended thermal model; null with emit2014.
+  [[nodiscard]] const FosterHeat* foster() const noexcept {
+    return std::get_if<FosterHeat>(&model_);
+  }
   /// The model of bodies. @pre some material rests on a body
   [[nodiscard]] const FosterHeat& of_bodies() const noexcept {
     return *std::get_if<FosterHeat>(&model_);

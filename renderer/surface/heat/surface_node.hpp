@@ -92,13 +92,19 @@ template <class T>
   for (std::size_t i = 0; i < a.size(); ++i) out[i] = between(a[i], b[i], frac);
   return out;
 }
+[[nodiscard]] inline physics::CellState<float> between(const physics::CellState<float>& a,
+                                                       const physics::CellState<float>& b,
+                                                       double frac) noexcept {
+  physics::CellState<float> out;
+  for (std::size_t l = 0; l < a.size(); ++l) out[l] = between(a[l], b[l], frac);
+  return out;
+}
 [[nodiscard]] inline SampleState between(const SampleState& a, const SampleState& b,
                                          double frac) noexcept {
   SampleState out;
   out.modes_k = between(a.modes_k, b.modes_k, frac);
-  for (std::size_t p = 0; p < kMaxPartners; ++p) {
-    out.partner_k[p] = between(a.partner_k[p], b.partner_k[p], frac);
-  }
+  out.cells_k = between(a.cells_k, b.cells_k, frac);
+  out.alone_k = between(a.alone_k, b.alone_k, frac);
   return out;
 }
 [[nodiscard]] inline SampleOutput between(const SampleOutput& a, const SampleOutput& b,
@@ -106,7 +112,7 @@ template <class T>
   SampleOutput out;
   for (float SampleOutput::*value :
        {&SampleOutput::offset_k, &SampleOutput::sun_frac, &SampleOutput::longwave_out_w_m2,
-        &SampleOutput::shortwave_out_w_m2, &SampleOutput::flux_w_m2}) {
+        &SampleOutput::shortwave_out_w_m2}) {
     out.*value = between(a.*value, b.*value, frac);
   }
   return out;

@@ -5,6 +5,7 @@
 #include <glm/ext/vector_float3.hpp>
 #include <vector>
 
+#include "emit/physics/column_cells.hpp"
 #include "emit/physics/foster.hpp"
 
 /// Thermal samples: points of the surface that remember their temperature. They are plain data; a
@@ -13,8 +14,6 @@ namespace emit::renderer {
 
 /// Index that stands for no sample.
 inline constexpr std::uint32_t kNoSample = 0xffffffffU;
-/// Largest number of faces across convex edges with which a sample exchanges heat.
-inline constexpr std::size_t kMaxPartners = 2;
 
 /// Sample in whose neighbourhood rays of a view ended, and the share of those rays.
 struct SeenSample {
@@ -22,13 +21,20 @@ struct SeenSample {
   float weight_frac = 0.0F;
 };
 
-/// Partner of a sample: the point of the neighbouring face that has the same distance from their
-/// convex edge.
-struct Partner {
+/// Cells of the column of a sample beside a crease (physics.md eq. 22): which shares of them belong
+/// to it, and what they exchange heat with. All conductances are per area of the sample.
+struct SampleColumn {
   std::uint32_t sample = kNoSample;
-  float distance_m = 0.0F;  ///< distance of either point from the edge
-  /// Share w_i of the partner's flux that drives each mode (physics.md eq. 22).
-  std::array<float, physics::kMaxFosterModes> weight_frac{};
+  physics::CellState<float> share_frac{};  ///< of the cells of the whole stack; the rest is cut off
+  physics::CellState<float> below_w_m2_k{};  ///< to the next cell, or to the base
+  /// Entries of SurfaceSamples::links of cell l: first_link[l] .. first_link[l + 1].
+  std::array<std::uint32_t, physics::kMaxColumnCells + 1> first_link{};
+};
+/// Cell of another column with which a cell exchanges heat.
+struct CellLink {
+  std::uint32_t column = 0;
+  std::uint32_t cell = 0;
+  float conductance_w_m2_k = 0.0F;
 };
 
 /// Place, material and view of a sample. They are fixed while the geometry of the scene stays the
@@ -65,7 +71,8 @@ struct SurfaceSample {
   std::uint32_t other_side = kNoSample;
   float flat_m = 0.0F;   ///< the surface is plane at least this far in all directions
   float facet_m = 0.0F;  ///< longest edge of the triangles on which it lies, before any is halved
-  std::array<Partner, kMaxPartners> partners{};
+  /// Column in SurfaceSamples::columns; kNoSample where heat moves straight down alone.
+  std::uint32_t column = kNoSample;
 };
 
 /// Measure by which directions count when a sample looks for sky.
@@ -78,11 +85,18 @@ enum class SkyMeasure : std::uint8_t {
 /// foster they are kelvins above the base (physics.md eq. 17), with emit2014 offsets from the
 /// reference temperature.
 struct SampleState {
-  /// Modes of the sample itself. With foster its own flux drives them, with emit2014 its
-  /// equilibrium temperature.
+  /// Modes: with foster the sample's own flux drives them, with emit2014 its equilibrium
+  /// temperature.
   physics::FosterState<double> modes_k{};
-  /// Modes y_i that the fluxes of each partner drive (physics.md eq. 22).
-  std::array<physics::FosterState<double>, kMaxPartners> partner_k{};
+  /// Cells of the sample's column (physics.md eq. 22), from the reference temperature: with the
+  /// heat of its neighbours, and as they were if it had none. They are 0 without a column.
+  physics::CellState<float> cells_k{};
+  physics::CellState<float> alone_k{};
+
+  /// Returns by how much the neighbours have warmed the surface.
+  [[nodiscard]] double aside_k() const noexcept {
+    return static_cast<double>(cells_k[0]) - static_cast<double>(alone_k[0]);
+  }
 };
 
 /// Output of a sample at one node of time, which other samples and the device read.
@@ -94,13 +108,15 @@ struct SampleOutput {
   float sun_frac = 0.0F;
   float longwave_out_w_m2 = 0.0F;   ///< emitted and reflected
   float shortwave_out_w_m2 = 0.0F;  ///< reflected sunlight, mean of the interval before
-  float flux_w_m2 = 0.0F;           ///< net flux into the solid
 };
 
-/// All samples of a scene and the lists of samples that they see.
+/// All samples of a scene, the lists of samples that they see, and the columns of those that
+/// exchange heat along the surface.
 struct SurfaceSamples {
   std::vector<SurfaceSample> samples;
-  std::vector<SeenSample> seen;  ///< lists of all samples, one after the other
+  std::vector<SeenSample> seen;       ///< lists of all samples, one after the other
+  std::vector<SampleColumn> columns;  ///< ascending by sample
+  std::vector<CellLink> links;        ///< of all columns, one after the other
 };
 
 /// Returns whether a sample is advanced on its own. It is false for the second side of a sheet,

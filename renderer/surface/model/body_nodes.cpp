@@ -31,12 +31,6 @@ std::size_t name_bodies(const scene::SceneGeometry& geometry, const SampleHeat& 
       const auto body = bodies.try_emplace({instance.object, instance.placement},
                                            static_cast<std::int32_t>(bodies.size()));
       all[s].body = body.first->second;
-      // Faces across an edge belong to the same body.
-      for (const Partner& partner : all[s].partners) {
-        if (partner.sample == kNoSample) continue;
-        SurfaceSample& other = all[partner.sample];
-        if (heat.rests_on_body(other.material)) other.body = all[s].body;
-      }
     }
   }
   return bodies.size();

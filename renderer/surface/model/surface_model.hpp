@@ -50,7 +50,7 @@ struct SurfaceModel {
   /// Index of the first sample of each instance. One sample per vertex of its mesh comes first,
   /// then one for the back of each vertex on a sheet.
   std::vector<std::uint32_t> first_sample;
-  SurfaceSamples samples;             ///< drawn samples first, then partners across convex edges
+  SurfaceSamples samples;             ///< samples of all instances
   std::uint32_t drawn_samples = 0;    ///< number of samples that belong to vertices and backs
   std::vector<SampleState> states;    ///< states at the end of the record
   std::vector<SampleOutput> outputs;  ///< outputs at the end of the record

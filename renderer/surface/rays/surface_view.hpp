@@ -104,24 +104,4 @@ class ViewSampler {
   std::vector<glm::vec3> directions_;
 };
 
-/// Face that meets the face of a point at a convex edge. Heat leaves the solid through it too.
-struct AdjacentFace {
-  glm::vec3 normal{0.0F};   ///< outward, unit length, in the axes of the point
-  float distance_m = 0.0F;  ///< from the point to the plane of the face, along `normal`
-};
-/// Result of adjacent_faces().
-struct AdjacentFaces {
-  std::array<AdjacentFace, 3> faces;  ///< nearest first
-  std::uint32_t count = 0;
-};
-
-/// Finds the faces across convex edges near a point. Eight rays run inside the body, just below the
-/// surface, and hit such faces from behind. A face counts if its plane is within `reach_m` and its
-/// normal is more than 60 degrees from that of the point. Among faces less than 40 degrees apart,
-/// such as the facets of a round side, only the nearest counts. A surface that bounds no body has
-/// none.
-[[nodiscard]] AdjacentFaces adjacent_faces(const CasterRays& casters, const ViewPoint& point,
-                                           float reach_m,
-                                           const CasterSelection& selection) noexcept;
-
 }  // namespace emit::renderer

@@ -390,7 +390,9 @@ void CachedSurface::forget_changes() noexcept {
 std::uint64_t CachedSurface::sample_bytes() const noexcept {
   const auto bytes = [](const auto& values) { return values.capacity() * sizeof(values[0]); };
   std::uint64_t sum = nodes_.bytes();
-  if (model_) sum += bytes(model_->samples.samples) + bytes(model_->samples.seen);
+  if (model_)
+    sum += bytes(model_->samples.samples) + bytes(model_->samples.seen) +
+           bytes(model_->samples.columns) + bytes(model_->samples.links);
   return sum;
 }
 

@@ -264,7 +264,8 @@ void LocalSteps::step(std::span<const std::uint32_t> blocks, std::uint32_t end,
     inputs.workers.run(batch_.size(), kSamplesPerTask, [&](std::size_t begin, std::size_t stop) {
       for (std::size_t k = begin; k < stop; ++k) {
         stepped_[k].state = from.states[batch_[k]];
-        step_sample(inputs.step, rays, interval, from.outputs, batch_[k], stepped_[k]);
+        step_sample(inputs.step, rays, interval, {from.states, from.outputs}, batch_[k],
+                    stepped_[k]);
       }
     });
     for (std::size_t k = 0; k < batch_.size(); ++k) {

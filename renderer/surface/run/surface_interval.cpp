@@ -94,7 +94,7 @@ void SurfaceInterval::compute(const SurfaceNode& from, SurfaceNode& to, std::uin
     for (auto i = static_cast<std::uint32_t>(first + task_begin); i < first + task_end; ++i) {
       if (!steps_itself(all, i) || (skipped != nullptr && skipped->has_own_clock(i))) continue;
       stepped.state = from.states[i];
-      step_sample(step, rays_, interval_, from.outputs, i, stepped);
+      step_sample(step, rays_, interval_, {from.states, from.outputs}, i, stepped);
       keep(i, stepped.state, stepped.output);
       const std::uint32_t behind = all.samples[i].other_side;
       if (behind != kNoSample) keep(behind, stepped.state, stepped.behind);

@@ -173,20 +173,14 @@ SampleDrive drive_of(const SurfaceStep& step, const IntervalRays& interval_rays,
                          view.own_scale * own.shortwave_w_m2;
   // Let the start of the interval stand for all of it: neighbours change by hundredths of a kelvin.
   drive.longwave_end_w_m2 = drive.longwave_begin_w_m2;
-  for (std::size_t p = 0; p < kMaxPartners; ++p) {
-    const std::uint32_t partner = sample.partners[p].sample;
-    if (partner == kNoSample) continue;
-    drive.partner_begin_w_m2[p] = begin[partner].flux_w_m2;
-    drive.partner_end_w_m2[p] = drive.partner_begin_w_m2[p];
-  }
   return drive;
 }
 
 }  // namespace
 
 void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
-                 const HeatInterval& interval, std::span<const SampleOutput> begin,
-                 std::uint32_t index, SteppedSample& stepped) noexcept {
+                 const HeatInterval& interval, const SurfaceBegin& begin, std::uint32_t index,
+                 SteppedSample& stepped) noexcept {
   EMIT_DCHECK(steps_itself(step.all, index));
   const ViewedSample viewed(step, interval_rays, step.all.samples[index]);
   const SurfaceSample& sample = viewed.sample();
@@ -195,9 +189,16 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
     return interval_rays.sun_share(step.rays, side, offsets.sun_m, 0.0F);
   };
   const SunShare sun = sun_of(sample);
-  const SampleDrive drive =
-      drive_of(step, interval_rays, interval.entities, begin, viewed, offsets, sun);
+  SampleDrive drive =
+      drive_of(step, interval_rays, interval.entities, begin.outputs, viewed, offsets, sun);
   const glm::vec3 normal = interval_rays.normal(sample);
+  BesideColumn beside;
+  if (sample.column != kNoSample) {
+    const SampleColumn& column = step.all.columns[sample.column];
+    beside = step.heat.foster()->beside(step.all, column, begin.states);
+    drive.aside.column = &column;
+    drive.aside.beside = &beside;
+  }
   if (sample.other_side == kNoSample) {
     stepped.output = step.heat.advance(sample, normal, interval, drive, stepped.state);
     // Show the sun that static geometry leaves, because frames have their own shade of entities.
@@ -208,8 +209,8 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
   const ViewedSample viewed_behind(step, interval_rays, step.all.samples[sample.other_side]);
   const SurfaceSample& behind = viewed_behind.sample();
   const SunShare sun_behind = sun_of(behind);
-  const SampleDrive back_drive =
-      drive_of(step, interval_rays, interval.entities, begin, viewed_behind, offsets, sun_behind);
+  const SampleDrive back_drive = drive_of(step, interval_rays, interval.entities, begin.outputs,
+                                          viewed_behind, offsets, sun_behind);
   const SheetBack back{behind, back_drive};
   stepped.output = step.heat.advance(sample, normal, interval, drive, stepped.state, &back);
   stepped.behind =

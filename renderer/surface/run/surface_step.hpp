@@ -36,11 +36,17 @@ struct SteppedSample {
   SampleOutput behind;
 };
 
-/// Advances sample `index` over an interval, from the state in `sample`. `begin` holds the outputs
-/// of all samples at the begin of the interval. Any thread; RT-safe.
+/// States and outputs of all samples at the begin of an interval.
+struct SurfaceBegin {
+  std::span<const SampleState> states;
+  std::span<const SampleOutput> outputs;
+};
+
+/// Advances sample `index` over an interval, from the state in `sample`. `begin` holds those of all
+/// samples. Any thread; RT-safe.
 /// @pre steps_itself(step.all, index): of a sheet it is the face with the lower index
 void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
-                 const HeatInterval& interval, std::span<const SampleOutput> begin,
-                 std::uint32_t index, SteppedSample& sample) noexcept;
+                 const HeatInterval& interval, const SurfaceBegin& begin, std::uint32_t index,
+                 SteppedSample& sample) noexcept;
 
 }  // namespace emit::renderer

@@ -63,9 +63,14 @@ void visit_members(T& e, const Visit& visit) {
   visit(e.world_m), visit(e.boresight);
 }
 template <class T, class Visit>
-requires std::same_as<std::remove_const_t<T>, Partner>
-void visit_members(T& p, const Visit& visit) {
-  visit(p.sample), visit(p.distance_m), visit(p.weight_frac);
+requires std::same_as<std::remove_const_t<T>, SampleColumn>
+void visit_members(T& c, const Visit& visit) {
+  visit(c.sample), visit(c.share_frac), visit(c.below_w_m2_k), visit(c.first_link);
+}
+template <class T, class Visit>
+requires std::same_as<std::remove_const_t<T>, CellLink>
+void visit_members(T& l, const Visit& visit) {
+  visit(l.column), visit(l.cell), visit(l.conductance_w_m2_k);
 }
 template <class T, class Visit>
 requires std::same_as<std::remove_const_t<T>, SeenSample>
@@ -80,19 +85,18 @@ void visit_members(T& s, const Visit& visit) {
   visit(s.far_frac), visit(s.first_seen), visit(s.seen_count), visit(s.seen_scale);
   visit(s.covered);
   visit(s.open_frac), visit(s.open_before_frac), visit(s.flat_m), visit(s.facet_m);
-  visit(s.partners);
+  visit(s.column);
   visit(s.other_side);
 }
 template <class T, class Visit>
 requires std::same_as<std::remove_const_t<T>, SampleState>
 void visit_members(T& s, const Visit& visit) {
-  visit(s.modes_k), visit(s.partner_k);
+  visit(s.modes_k), visit(s.cells_k), visit(s.alone_k);
 }
 template <class T, class Visit>
 requires std::same_as<std::remove_const_t<T>, SampleOutput>
 void visit_members(T& o, const Visit& visit) {
   visit(o.offset_k), visit(o.sun_frac), visit(o.longwave_out_w_m2), visit(o.shortwave_out_w_m2);
-  visit(o.flux_w_m2);
 }
 
 namespace {
@@ -117,6 +121,8 @@ void put_model(Sink& sink, const SurfaceModel& model) {
   put_value(sink, model.first_sample);
   put_value(sink, model.samples.samples);
   put_value(sink, model.samples.seen);
+  put_value(sink, model.samples.columns);
+  put_value(sink, model.samples.links);
   put_value(sink, model.drawn_samples);
   put_value(sink, model.states);
   put_value(sink, model.outputs);
@@ -170,6 +176,7 @@ bool consistent(const SurfaceModel& model, const scene::SceneGeometry& geometry,
                 std::size_t entities) {
   const std::size_t count = model.samples.samples.size();
   const std::size_t seen = model.samples.seen.size();
+  const std::vector<SampleColumn>& columns = model.samples.columns;
   if (model.states.size() != count || model.outputs.size() != count ||
       model.drawn_samples > count || model.first_sample.size() != geometry.instances.size() ||
       model.drawn.size() != model.meshes.size()) {
@@ -221,11 +228,21 @@ bool consistent(const SurfaceModel& model, const scene::SceneGeometry& geometry,
            s.entity < static_cast<std::int64_t>(entities) && s.body >= -1 &&
            s.body < static_cast<std::int64_t>(model.body_k.size()) && s.first_seen <= seen &&
            s.seen_count <= seen - s.first_seen &&
-           std::ranges::all_of(s.partners, [&](const Partner& partner) {
-             return partner.sample == kNoSample || partner.sample < count;
-           });
+           (s.column == kNoSample ||
+            (s.column < columns.size() && columns[s.column].sample < count &&
+             &all[columns[s.column].sample] == &s));
+  };
+  const auto column_fits = [&](const SampleColumn& c) {
+    return c.sample < count && std::ranges::is_sorted(c.first_link) &&
+           c.first_link.back() <= model.samples.links.size();
+  };
+  const auto link_fits = [&](const CellLink& l) {
+    return l.column < columns.size() && l.cell < physics::kMaxColumnCells &&
+           l.conductance_w_m2_k >= 0.0F;
   };
   return std::ranges::all_of(model.samples.samples, sample_fits) &&
+         std::ranges::all_of(columns, column_fits) &&
+         std::ranges::all_of(model.samples.links, link_fits) &&
          std::ranges::all_of(model.samples.seen,
                              [&](const SeenSample& s) { return s.sample < count; });
 }
@@ -396,6 +413,8 @@ Result<SurfaceModel> read_state(const std::filesystem::path& file, const StateWa
   take_value(source, model.first_sample);
   take_value(source, model.samples.samples);
   take_value(source, model.samples.seen);
+  take_value(source, model.samples.columns);
+  take_value(source, model.samples.links);
   take_value(source, model.drawn_samples);
   take_value(source, model.states);
   take_value(source, model.outputs);

@@ -7,7 +7,8 @@ namespace emit::renderer {
 
 BodyCourses::BodyCourses(const SurfaceModel& model, const scene::SceneGeometry& geometry,
                          const SampleHeat& heat, const HistoryRecord& record,
-                         std::span<const std::uint32_t> samples, std::size_t most)
+                         std::span<const std::uint32_t> samples,
+                         std::span<const std::uint32_t> kinds, std::size_t most)
     : all_(model.samples),
       heat_(heat),
       record_(record),
@@ -17,7 +18,8 @@ BodyCourses::BodyCourses(const SurfaceModel& model, const scene::SceneGeometry& 
   std::size_t rows = 0;
   for (std::uint32_t i = 0; i < samples.size(); ++i) {
     const std::int32_t body = all_.samples[samples[i]].body;
-    if (groups_.empty() || groups_.back().body != body || groups_.back().count == most) {
+    if (groups_.empty() || groups_.back().body != body || groups_.back().count == most ||
+        kinds[i] != kinds[i - 1]) {
       groups_.push_back({i, 0, body});
       row_of_group_.push_back(rows);
       if (body >= 0) ++rows;

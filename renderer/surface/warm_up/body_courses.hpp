@@ -23,11 +23,12 @@ class BodyCourses {
   };
 
   /// Begins with interiors that keep the temperature at which they start. `samples` is the list of
-  /// samples that are advanced, ascending; groups hold at most `most` of them. Everything that it
-  /// refers to must outlive it.
+  /// samples that are advanced; groups hold at most `most` of them, in their order, and all with
+  /// the same entry of `kinds`. Everything that it refers to must outlive it.
   BodyCourses(const SurfaceModel& model, const scene::SceneGeometry& geometry,
               const SampleHeat& heat, const HistoryRecord& record,
-              std::span<const std::uint32_t> samples, std::size_t most);
+              std::span<const std::uint32_t> samples, std::span<const std::uint32_t> kinds,
+              std::size_t most);
 
   [[nodiscard]] std::span<const Group> groups() const noexcept { return groups_; }
   /// Returns the mean temperature of a body over an interval.

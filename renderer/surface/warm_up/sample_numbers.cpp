@@ -181,28 +181,15 @@ void Numbers::run() {
     next += static_cast<std::uint32_t>(patch.samples.size());
     if (patch.back) next += static_cast<std::uint32_t>(backs_[patch.mesh].size());
   }
-  const std::size_t instances = in_.geometry.instances.size();
-  model_.first_sample.assign(first_.begin(),
-                             first_.begin() + static_cast<std::ptrdiff_t>(instances));
-  model_.drawn_samples = first_.size() > instances ? first_[instances] : next;
+  model_.first_sample = first_;
+  model_.drawn_samples = next;
   model_.samples.samples.reserve(next);
-  // Append the samples patch by patch. The partners' patch comes last, after all drawn samples.
+  // Append the samples patch by patch.
   for (std::size_t p = 0; p < patches_.size(); ++p) {
     SurfacePatch& patch = patches_[p];
-    const bool partners = p >= instances;
     list_views(patch);
     for (std::size_t i = 0; i < patch.samples.size(); ++i) {
-      SurfaceSample sample = patch.samples[i];
-      // Turn indices into a patch into indices of samples. Until now first_seen of a partner is the
-      // patch of the sample that it belongs to; append() overwrites it.
-      if (partners) {
-        sample.partners[0].sample += first_[sample.first_seen];
-      } else {
-        for (Partner& partner : sample.partners) {
-          if (partner.sample != kNoSample) partner.sample += first_[instances];
-        }
-      }
-      append(patch, i, sample);
+      append(patch, i, patch.samples[i]);
     }
     // Append the backs of sheets, and link both sides.
     if (!patch.back) continue;
@@ -221,7 +208,7 @@ void Numbers::run() {
 
 void number_samples(const SurfaceInputs& inputs, const SurfaceModelOptions& options,
                     std::vector<SurfacePatch>& patches, SurfaceModel& model) {
-  EMIT_CHECK_OP(patches.size(), ==, inputs.geometry.instances.size() + (options.lateral ? 1U : 0U));
+  EMIT_CHECK_OP(patches.size(), ==, inputs.geometry.instances.size());
   Numbers(inputs, options, patches, model).run();
 }
 

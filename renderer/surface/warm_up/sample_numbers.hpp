@@ -9,7 +9,6 @@ namespace emit::renderer {
 /// Lays the samples of all patches out in one array, and turns the places that they see into
 /// samples. Samples that share a view share its list of seen samples. Frees the views of the
 /// patches. Setup only; uses all cores; deterministic.
-/// @pre where options.lateral is set, PartnerFinder::append() has appended its patch
 void number_samples(const SurfaceInputs& inputs, const SurfaceModelOptions& options,
                     std::vector<SurfacePatch>& patches, SurfaceModel& model);
 

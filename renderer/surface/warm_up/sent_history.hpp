@@ -9,19 +9,18 @@
 
 namespace emit::renderer {
 
-/// Radiation and heat that one sample sends out over the whole history: a view of a row of float32
-/// numbers. The row holds the long-wave exitance at every node, the reflected sunlight of every
-/// interval and the net flux into the solid at every node, all in W/m2. An interval lies between
-/// two nodes. A view of an empty row keeps nothing.
+/// Radiation that one sample sends out over the whole history: a view of a row of float32 numbers.
+/// The row holds the long-wave exitance at every node and the reflected sunlight of every interval,
+/// all in W/m2. An interval lies between two nodes. A view of an empty row keeps nothing.
 class SentRow {
  public:
   SentRow() = default;
   explicit SentRow(std::span<float> values) noexcept
-      : values_(values.data()), intervals_(values.empty() ? 0 : (values.size() - 2) / 3) {}
+      : values_(values.data()), intervals_(values.empty() ? 0 : (values.size() - 1) / 2) {}
 
   /// Returns the number of values in the row of a history of `intervals` intervals.
   [[nodiscard]] static constexpr std::size_t length(std::size_t intervals) noexcept {
-    return 3 * intervals + 2;
+    return 2 * intervals + 1;
   }
 
   /// Stores the output at the first node. @pre the row is not empty
@@ -37,15 +36,9 @@ class SentRow {
   [[nodiscard]] float shortwave_w_m2(std::size_t interval) const noexcept {
     return values_[intervals_ + 1 + interval];
   }
-  [[nodiscard]] float flux_w_m2(std::size_t node) const noexcept {
-    return values_[2 * intervals_ + 1 + node];
-  }
   void keep_longwave(std::size_t node, float w_m2) const noexcept { values_[node] = w_m2; }
   void keep_shortwave(std::size_t interval, float w_m2) const noexcept {
     values_[intervals_ + 1 + interval] = w_m2;
-  }
-  void keep_flux(std::size_t node, float w_m2) const noexcept {
-    values_[2 * intervals_ + 1 + node] = w_m2;
   }
 
  private:
@@ -53,7 +46,6 @@ class SentRow {
     EMIT_DCHECK(values_ != nullptr);
     EMIT_DCHECK_OP(node, <=, intervals_);
     values_[node] = output.longwave_out_w_m2;
-    values_[2 * intervals_ + 1 + node] = output.flux_w_m2;
   }
 
   float* values_ = nullptr;

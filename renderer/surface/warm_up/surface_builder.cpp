@@ -18,8 +18,8 @@
 #include "surface/rays/ray_offsets.hpp"
 #include "surface/warm_up/facet_edges.hpp"
 #include "surface/warm_up/sample_numbers.hpp"
+#include "surface/warm_up/surface_columns.hpp"
 #include "surface/warm_up/surface_exchange.hpp"
-#include "surface/warm_up/surface_partners.hpp"
 #include "surface/warm_up/surface_patch.hpp"
 #include "surface/warm_up/surface_refinement.hpp"
 
@@ -59,29 +59,27 @@ class EvaluationProgress {
     most_ = static_cast<double>(std::max(samples, most));
     least_ = refined_ = std::min(2.5 * static_cast<double>(samples), most_);
   }
-  /// Takes what a round of the refinement found: the leaves that are too coarse, and the partners
-  /// of all samples so far. The refinement is over when no leaf is too coarse.
-  void expect(std::size_t coarse_leaves, std::size_t partners) noexcept {
+  /// Takes the number of leaves that a round of the refinement found too coarse. The refinement is
+  /// over when there is none.
+  void expect(std::size_t coarse_leaves) noexcept {
     // A leaf that is halved often has halves that are too coarse as well.
     constexpr double kSamplesOfLeaf = 2.5;
     const double left = kSamplesOfLeaf * static_cast<double>(coarse_leaves);
     const double expected = std::min(std::max(least_, done_ + left), std::max(most_, done_));
     refined_ = coarse_leaves == 0 ? done_ : expected;
-    partners_ = static_cast<double>(partners);
   }
   /// Takes the number of samples that were evaluated since the last call. Returns the part that is
   /// done, 0 to 1; it never falls.
   double advance(std::size_t samples) noexcept {
     done_ += static_cast<double>(samples);
-    frac_ = std::max(frac_, done_ / std::max({refined_ + partners_, done_, 1.0}));
+    frac_ = std::max(frac_, done_ / std::max({refined_, done_, 1.0}));
     return frac_;
   }
 
  private:
-  double most_ = 0.0;      ///< greatest number of samples after the refinement
-  double least_ = 0.0;     ///< least number of samples after the refinement
-  double refined_ = 0.0;   ///< expected number of samples after the refinement
-  double partners_ = 0.0;  ///< expected number of partners
+  double most_ = 0.0;     ///< greatest number of samples after the refinement
+  double least_ = 0.0;    ///< least number of samples after the refinement
+  double refined_ = 0.0;  ///< expected number of samples after the refinement
   double done_ = 0.0;
   double frac_ = 0.0;
 };
@@ -102,7 +100,6 @@ class Builder {
         progress_(progress),
         sensitivity_(inputs),
         sampler_(inputs, sensitivity_, options),
-        partners_(inputs, sampler_),
         refinement_(inputs, sensitivity_, view, options) {}
 
   physics::Result<SurfaceModel> run();
@@ -140,14 +137,11 @@ class Builder {
   EvaluationProgress evaluation_;
   DriveSensitivity sensitivity_;
   PatchSampler sampler_;
-  PartnerFinder partners_;  ///< used only where heat moves across edges
   SurfaceRefinement refinement_;
   SurfaceModel model_;
   std::vector<SurfacePatch> patches_;
   std::vector<std::vector<std::uint32_t>> patches_of_mesh_;
-  std::size_t sample_count_ = 0;    ///< samples of all patches, partners included
-  std::size_t partner_count_ = 0;   ///< partners among these
-  std::size_t least_count_ = 0;     ///< samples before anything is refined
+  std::size_t sample_count_ = 0;    ///< samples of all patches
   bool short_of_samples_ = false;   ///< leaves stayed whole in this round, because samples ran out
   std::vector<FacetEdges> facets_;  ///< by mesh
   // Arrays by vertex of the mesh at hand, filled for the vertices that have no sample yet.
@@ -231,7 +225,6 @@ bool Builder::sample_new_vertices() {
       }
       looked = true;
       patch.grow(vertices.size());
-      if (options_.lateral) partners_.grow(p, vertices.size());
       for (std::uint32_t v = first; v < vertices.size(); ++v) {
         SurfaceSample& sample = patch.samples[v];
         // Move the sample off the edge on which the vertex lies, by the distance at which rays
@@ -276,23 +269,13 @@ bool Builder::sample_new_vertices() {
           group[k] = {&patches_[job.patch], job.index, job_stand_[j + k]};
         }
         sampler_.evaluate(std::span(group).first(count), memo);
-        if (!options_.lateral) continue;
-        for (std::size_t k = j; k < j + count; ++k) {
-          const Job& job = jobs_[k];
-          partners_.find(job.patch, job.index, patches_[job.patch].samples[job.index]);
-        }
       }
     });
     if (!report_evaluated(end - begin)) return false;
   }
-  // Count the partners found, and compare each sample with the mean of its parents.
+  // Compare each sample with the mean of its parents.
   for (const Job& job : jobs_) {
     SurfacePatch& patch = patches_[job.patch];
-    if (options_.lateral) {
-      const std::size_t found = partners_.count(job.patch, job.index);
-      partner_count_ += found;
-      sample_count_ += found;
-    }
     const RefinedMesh::Vertex& vertex = model_.meshes[patch.mesh].vertices()[job.index];
     if (vertex.parent[0] == job.index) continue;
     const float mean_k = 0.5F * (patch.outputs[vertex.parent[0]].offset_k +
@@ -327,7 +310,7 @@ void Builder::replace_covered() {
     for (std::uint32_t slot = 0; slot < mesh.leaf_count(); ++slot) {
       for (const std::uint32_t covered : mesh.leaf(slot)) {
         const SurfaceSample& under = all.samples[first + covered];
-        if (!under.covered || under.other_side != kNoSample) continue;
+        if (!under.covered || under.other_side != kNoSample || under.column != kNoSample) continue;
         for (const std::uint32_t other : mesh.leaf(slot)) {
           if (all.samples[first + other].covered) continue;
           std::uint32_t& nearest = open[covered];
@@ -341,6 +324,7 @@ void Builder::replace_covered() {
     for (std::uint32_t v = 0; v < open.size(); ++v) {
       if (open[v] == kNoSample) continue;
       all.samples[first + v] = all.samples[first + open[v]];
+      all.samples[first + v].column = kNoSample;
       model_.states[first + v] = model_.states[first + open[v]];
       model_.outputs[first + v] = model_.outputs[first + open[v]];
     }
@@ -356,15 +340,8 @@ void Builder::split(std::uint32_t mesh, float above) {
       options_.max_samples > sample_count_ ? options_.max_samples - sample_count_ : 0;
   const std::size_t vertices = refined.vertices().size();
   const std::size_t samples = samples_of(mesh);
-  // Leave room for the partners of new samples: half as many again per sample as those so far. A
-  // vertex of a sheet has two samples.
-  constexpr double kMorePartners = 1.5;
-  const double partners_of_sample =
-      kMorePartners * static_cast<double>(partner_count_) /
-      static_cast<double>(std::max<std::size_t>(sample_count_ - partner_count_, 1));
-  const double samples_of_vertex = static_cast<double>(samples > vertices ? 2 * uses : uses);
-  const auto most = static_cast<std::size_t>(static_cast<double>(left) /
-                                             (samples_of_vertex * (1.0 + partners_of_sample)));
+  // A vertex of a sheet has two samples.
+  const std::size_t most = left / std::max<std::size_t>(samples > vertices ? 2 * uses : uses, 1);
   // Take the neediest first if there are more leaves than new vertices.
   refined.limit(vertices + most);
   if (needs_.size() > most) {
@@ -409,7 +386,6 @@ physics::Result<SurfaceModel> Builder::run() {
   evaluation_.begin(sample_count_, options_.max_samples);
   std::size_t count_before = 0;  // samples before the latest round
   if (!sample_new_vertices()) return stopped();
-  least_count_ = sample_count_;
   // Refine in rounds, the greatest need first: if samples run out, what is left matters least.
   for (std::uint32_t round = 0;; ++round) {
     SurfaceRefinement::Most most;
@@ -420,7 +396,7 @@ physics::Result<SurfaceModel> Builder::run() {
       most.in_view = std::max(most.in_view, here.in_view);
       most.coarse_leaves += here.coarse_leaves;
     }
-    evaluation_.expect(most.coarse_leaves, partner_count_);
+    evaluation_.expect(most.coarse_leaves);
     // Stop when samples have run out. The next round takes the room that this one leaves, until a
     // round adds next to nothing.
     const bool none_left =
@@ -438,18 +414,10 @@ physics::Result<SurfaceModel> Builder::run() {
     for (std::uint32_t mesh = 0; mesh < model_.meshes.size(); ++mesh) split(mesh, above);
     if (!sample_new_vertices()) return stopped();
   }
-  if (options_.lateral) {
-    // Drop the weakest partners if those of the last samples are more than room was left for.
-    if (sample_count_ > options_.max_samples && sample_count_ > least_count_) {
-      partners_.drop(sample_count_ - std::max(options_.max_samples, least_count_));
-    }
-    evaluation_.expect(0, partners_.count());
-    const auto evaluated = [this](std::size_t samples) { return report_evaluated(samples); };
-    if (!partners_.append(patches_, evaluated)) return stopped();
-  }
   // Lay all samples out in one array, and integrate their history again with exchange.
   number_samples(in_, options_, patches_, model_);
   name_bodies(in_.geometry, in_.heat, model_);
+  if (options_.lateral) link_columns(in_, model_);
   const auto exchanged = [this](double frac) {
     return report(kEvaluatedFrac + (1.0 - kEvaluatedFrac) * frac);
   };

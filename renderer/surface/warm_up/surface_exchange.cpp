@@ -13,6 +13,7 @@
 #include "surface/mesh/sheet_sides.hpp"
 #include "surface/model/entity_exitance.hpp"
 #include "surface/warm_up/body_courses.hpp"
+#include "surface/warm_up/column_system.hpp"
 #include "surface/warm_up/fixed_point_mixer.hpp"
 
 namespace emit::renderer {
@@ -28,6 +29,10 @@ constexpr std::size_t kWindow = 16;
 constexpr std::uint32_t kPlainIterations = 4;
 /// A list is taken anew when it has changed by more than this share of kExchangeResidual.
 constexpr double kRenewFrac = 0.5;
+/// Rounds in which surfaces and the columns below them agree over an interval, and the difference
+/// at which they do, K.
+constexpr int kMostColumnRounds = 4;
+constexpr double kColumnsAgreeK = 0.02;
 
 /// A pass over the record has one of these purposes.
 enum class Pass : std::uint8_t {
@@ -175,8 +180,7 @@ class Sweeper {
   Sweeper(const SurfaceInputs& inputs, const ExchangeOptions& options, SampleHistories histories,
           SurfaceModel& model);
 
-  /// Returns whether some samples take a course from the pass before: the flux of a partner, or the
-  /// interior of a body.
+  /// Returns whether some samples take a course from the pass before: the interior of a body.
   [[nodiscard]] bool takes_courses() const noexcept { return takes_courses_; }
   /// Does a pass over the record. `report` receives the share of the pass that is done. Returns
   /// false when it stopped.
@@ -189,14 +193,14 @@ class Sweeper {
   void settle(const Window& window);
   /// Keeps the rows and the states at the end of a window.
   void store(const Window& window);
-  /// Makes the fluxes and the interiors of this pass those that the next one takes.
+  /// Makes the interiors of this pass those that the next one takes.
   void take_courses();
   /// Measures the radiation of the faces of entities at every node of a window. Returns by how much
   /// it has changed since the call before, W/m2.
   double measure_faces(const Window& window);
   /// Returns whether a sample takes a course from the pass before.
   [[nodiscard]] bool takes_course(std::uint32_t s) const noexcept {
-    return flux_row_[s] != kNoList || model_.samples.samples[s].body >= 0;
+    return model_.samples.samples[s].body >= 0;
   }
   /// Advances those groups over a window of which `chosen(s)` is true for a sample.
   template <class Chosen>
@@ -204,10 +208,10 @@ class Sweeper {
   /// Returns whether the latest iteration has changed what a sample receives in a window.
   [[nodiscard]] bool changed(std::uint32_t s, const Window& window,
                              bool faces_changed) const noexcept;
-  /// Returns true if nothing changes the sample: it sees no other one, has no partner and no body,
+  /// Returns true if nothing changes the sample: it sees no other one, has no column and no body,
   /// and no entity that sends radiation hides its sky.
   [[nodiscard]] bool alone(std::size_t s) const noexcept;
-  /// Input of sample `s` in interval k of a window, without the fluxes of its partners.
+  /// Input of sample `s` in interval k of a window.
   [[nodiscard]] SampleDrive drive(std::size_t s, const glm::vec3& normal, const Window& window,
                                   std::size_t k) const noexcept;
   /// Adds the radiation of the entity that hides most of the sample's sky.
@@ -215,9 +219,24 @@ class Sweeper {
                     SampleDrive& drive) const noexcept;
   /// Integrates the samples of a group, and the other faces of sheets with them, over a window.
   void carry(std::size_t group, const Window& window);
-  /// Input of sample `s` in interval k of a window, with the fluxes of its partners.
-  [[nodiscard]] SampleDrive whole_drive(std::size_t s, const glm::vec3& normal,
-                                        const Window& window, std::size_t k) const noexcept;
+  /// Integrates the samples of the islands in `needed_` over a window, all of an island interval by
+  /// interval.
+  void march(const Window& window);
+  /// Integrates the samples of a group over a window with the heat of neighbours that the latest
+  /// march() has found.
+  void carry_columns(std::size_t group, const Window& window);
+  /// Advances the samples of a group over interval k of a window, and fills the equations of their
+  /// columns. Cells stay at its begin.
+  void begin_columns(std::size_t group, const Window& window, std::size_t k) noexcept;
+  /// Takes over what the columns of a group agree on at the end of interval k of a window.
+  void end_columns(std::size_t group, const Window& window, std::size_t k) noexcept;
+  /// Island of a group; kNoList if its samples have no columns.
+  [[nodiscard]] std::uint32_t island(std::size_t group) const noexcept {
+    return kinds_[bodies_->groups()[group].first] - 1;
+  }
+  [[nodiscard]] std::uint32_t column(std::uint32_t s) const noexcept {
+    return model_.samples.samples[s].column;
+  }
   /// Row of a sample in the window at hand.
   [[nodiscard]] float* row_of(std::size_t s, const Window& window) noexcept {
     return &sent_[s * row_size(window.count)];
@@ -227,13 +246,12 @@ class Sweeper {
   SurfaceModel& model_;
   SampleHistories histories_;
   std::size_t intervals_;
-  std::vector<std::uint32_t> swept_;     ///< samples that change; one for both faces of a sheet
-  std::vector<SentRow> rows_;            ///< by sample: what it sent in the latest pass
-  RowStore<float> flux_w_m2_;            ///< fluxes of this pass at every node: rows of partners
-  std::vector<std::uint32_t> flux_row_;  ///< by sample: its row there, or kNoList
-  std::vector<float> sent_;              ///< by sample: its row in the window at hand
-  std::vector<float> shift_w_m2_;        ///< by sample: long wave at the last node above its guess
-  std::vector<SampleState> begin_;       ///< by sample: state at the begin of the window
+  std::vector<std::uint32_t> swept_;  ///< samples that change; one for both faces of a sheet
+  std::vector<SentRow> rows_;         ///< by sample: what it sent in the latest pass
+  std::vector<std::uint32_t> kinds_;  ///< by entry of `swept_`: 1 + island of its column, or 0
+  std::vector<float> sent_;           ///< by sample: its row in the window at hand
+  std::vector<float> shift_w_m2_;     ///< by sample: long wave at the last node above its guess
+  std::vector<SampleState> begin_;    ///< by sample: state at the begin of the window
   SeenRadiation seen_;
   EntityExitance exitance_;
   std::size_t entities_ = 0;         ///< entities whose faces count; 0 without exchange
@@ -241,6 +259,19 @@ class Sweeper {
   std::vector<EntityFaces> before_;  ///< faces of the iteration before
   bool takes_courses_ = false;
   std::optional<BodyCourses> bodies_;
+  /// A sample with a column, in the interval at hand.
+  struct Front {
+    SampleDrive drive;
+    SampleState next;       ///< modes at the end of the interval, cells at its begin
+    double change_k = 0.0;  ///< change over the interval of what neighbours add to the surface
+    /// Results of the iteration before, by interval of the window: cells, and that change.
+    std::array<physics::CellState<float>, kWindow> known_k{};
+    std::array<float, kWindow> known_change_k{};
+  };
+  ColumnSystem columns_;
+  std::vector<Front> fronts_;         ///< by column
+  std::vector<std::uint8_t> known_;   ///< by island: the window was integrated before
+  std::vector<std::uint8_t> needed_;  ///< by island: to be integrated
 };
 
 Sweeper::Sweeper(const SurfaceInputs& inputs, const ExchangeOptions& options,
@@ -249,30 +280,33 @@ Sweeper::Sweeper(const SurfaceInputs& inputs, const ExchangeOptions& options,
       model_(model),
       histories_(std::move(histories)),
       intervals_(inputs.record.size()),
-      flux_w_m2_(intervals_ + 1),
-      flux_row_(model.samples.samples.size(), kNoList),
       shift_w_m2_(model.samples.samples.size()),
-      seen_(model.samples) {
+      seen_(model.samples),
+      columns_(model.samples),
+      fronts_(model.samples.columns.size()),
+      known_(columns_.islands()),
+      needed_(columns_.islands()) {
   for (const SampleHistories::Rows& rows : histories_.rows) rows_.emplace_back(rows.sent_w_m2);
   if (options.exitance && !inputs.entities_now.empty()) {
     exitance_ = EntityExitance(model, inputs.geometry, inputs.entity_of_object);
     entities_ = inputs.entities_now.size();
   }
-  // Find the samples that change, and give those a row of fluxes that others may ask for theirs.
+  // Find the samples that change. Those with columns come last, island by island.
   const std::vector<SurfaceSample>& all = model_.samples.samples;
   for (std::uint32_t s = 0; s < all.size(); ++s) {
     if (!steps_itself(model_.samples, s)) continue;
     const std::uint32_t other = all[s].other_side;
     if (alone(s) && (other == kNoSample || alone(other))) continue;
     swept_.push_back(s);
-    const auto is_partner = [](const Partner& partner) { return partner.sample != kNoSample; };
-    if (std::ranges::any_of(all[s].partners, is_partner)) {
-      flux_row_[s] = static_cast<std::uint32_t>(flux_w_m2_.rows());
-      flux_w_m2_.grow(flux_w_m2_.rows() + 1);
-    }
     takes_courses_ = takes_courses_ || takes_course(s);
   }
-  bodies_.emplace(model, inputs.geometry, inputs.heat, inputs.record, swept_, kAdvanceTogether);
+  const auto kind = [&](std::uint32_t s) {
+    return column(s) == kNoSample ? 0 : 1 + columns_.island(column(s));
+  };
+  std::ranges::stable_sort(swept_, {}, kind);
+  for (const std::uint32_t s : swept_) kinds_.push_back(kind(s));
+  bodies_.emplace(model, inputs.geometry, inputs.heat, inputs.record, swept_, kinds_,
+                  kAdvanceTogether);
   model.body_k = bodies_->end_k();
 }
 
@@ -288,7 +322,10 @@ bool Sweeper::sweep(Pass pass, const SurfaceProgress& report) {
     seen_.begin(sent_, window.count);
     faces_.resize(entities_ * (window.count + 1));
     measure_faces(window);
+    std::ranges::fill(known_, std::uint8_t{0});
+    std::ranges::fill(needed_, std::uint8_t{0});
     carry_groups(window, [&](std::uint32_t s) { return pass != Pass::courses || takes_course(s); });
+    march(window);
     if (pass == Pass::settle) settle(window);
     store(window);
   }
@@ -316,7 +353,12 @@ void Sweeper::settle(const Window& window) {
     const double faces_w_m2 = measure_faces(window);
     const double seen_w_m2 = seen_.look(sent_);
     const double left_w_m2 = std::max(faces_w_m2, seen_w_m2);
-    if (!(left_w_m2 > kExchangeResidual_w_m2)) return;
+    if (!(left_w_m2 > kExchangeResidual_w_m2)) {
+      // The radiation has settled with the heat along the surface that was known: find it anew.
+      if (std::ranges::find(needed_, std::uint8_t{1}) == needed_.end()) return;
+      march(window);
+      continue;
+    }
     if (i + 1 == kMostIterations) {
       model_.exchange_left_w_m2 = std::max(model_.exchange_left_w_m2, left_w_m2);
       return;
@@ -351,13 +393,6 @@ void Sweeper::store(const Window& window) {
 }
 
 void Sweeper::take_courses() {
-  for (const std::uint32_t s : swept_) {
-    if (flux_row_[s] == kNoList) continue;
-    const std::span<const float> flux_w_m2 = flux_w_m2_.row(flux_row_[s]);
-    for (std::size_t node = 0; node < flux_w_m2.size(); ++node) {
-      rows_[s].keep_flux(node, flux_w_m2[node]);
-    }
-  }
   bodies_->correct();
   model_.body_k = bodies_->end_k();
 }
@@ -386,10 +421,7 @@ double Sweeper::measure_faces(const Window& window) {
 
 bool Sweeper::alone(std::size_t s) const noexcept {
   const SurfaceSample& sample = model_.samples.samples[s];
-  if (sample.seen_count != 0 || sample.body >= 0) return false;
-  for (const Partner& partner : sample.partners) {
-    if (partner.sample != kNoSample) return false;
-  }
+  if (sample.seen_count != 0 || sample.body >= 0 || sample.column != kNoSample) return false;
   if (entities_ == 0) return true;
   return std::ranges::all_of(histories_.rows[s].hidden_sky,
                              [](const HiddenSky& sky) { return sky.frac == 0.0F; });
@@ -406,16 +438,31 @@ bool Sweeper::changed(std::uint32_t s, const Window& window, bool faces_changed)
 template <class Chosen>
 void Sweeper::carry_groups(const Window& window, const Chosen& chosen) {
   const std::span<const BodyCourses::Group> groups = bodies_->groups();
+  const auto needed = [&](std::size_t group) {
+    const auto samples = std::span(swept_).subspan(groups[group].first, groups[group].count);
+    return std::ranges::any_of(samples, [&](std::uint32_t s) {
+      const std::uint32_t other = model_.samples.samples[s].other_side;
+      return chosen(s) || (other != kNoSample && chosen(other));
+    });
+  };
   threads::parallel_parts(groups.size(), kGrain, [&](std::size_t from, std::size_t to) {
     for (std::size_t group = from; group < to; ++group) {
-      const auto samples = std::span(swept_).subspan(groups[group].first, groups[group].count);
-      const bool needed = std::ranges::any_of(samples, [&](std::uint32_t s) {
-        const std::uint32_t other = model_.samples.samples[s].other_side;
-        return chosen(s) || (other != kNoSample && chosen(other));
-      });
-      if (needed) carry(group, window);
+      if (island(group) == kNoList && needed(group)) carry(group, window);
     }
   });
+  // Samples with columns are carried with the heat of neighbours that is known, and their island
+  // waits for march(). Without such knowledge march() comes first.
+  std::vector<std::uint8_t> dirty(groups.size(), 0);
+  threads::parallel_parts(groups.size(), kGrain, [&](std::size_t from, std::size_t to) {
+    for (std::size_t group = from; group < to; ++group) {
+      if (island(group) == kNoList || !needed(group)) continue;
+      dirty[group] = 1;
+      if (known_[island(group)] != 0) carry_columns(group, window);
+    }
+  });
+  for (std::size_t group = 0; group < groups.size(); ++group) {
+    if (dirty[group] != 0) needed_[island(group)] = 1;
+  }
 }
 
 SampleDrive Sweeper::drive(std::size_t s, const glm::vec3& normal, const Window& window,
@@ -453,18 +500,159 @@ void Sweeper::add_exitance(std::size_t s, const glm::vec3& normal, const Window&
   drive.hidden_is_seen = true;
 }
 
-SampleDrive Sweeper::whole_drive(std::size_t s, const glm::vec3& normal, const Window& window,
-                                 std::size_t k) const noexcept {
-  SampleDrive drive = this->drive(s, normal, window, k);
-  const SurfaceSample& sample = model_.samples.samples[s];
-  const std::size_t j = window.first + k;
-  for (std::size_t p = 0; p < kMaxPartners; ++p) {
-    const std::uint32_t partner = sample.partners[p].sample;
-    if (partner == kNoSample) continue;
-    drive.partner_begin_w_m2[p] = rows_[partner].flux_w_m2(j);
-    drive.partner_end_w_m2[p] = rows_[partner].flux_w_m2(j + 1);
+void Sweeper::march(const Window& window) {
+  // List the groups of these islands; their samples begin with the window.
+  std::vector<std::uint32_t> groups;
+  std::vector<std::uint32_t> islands;
+  for (std::uint32_t group = 0; group < bodies_->groups().size(); ++group) {
+    if (island(group) == kNoList || needed_[island(group)] == 0) continue;
+    if (islands.empty() || islands.back() != island(group)) islands.push_back(island(group));
+    groups.push_back(group);
+    const BodyCourses::Group& chosen = bodies_->groups()[group];
+    if (chosen.body >= 0) bodies_->forget(group, window.first, window.count);
+    for (std::size_t i = chosen.first; i < chosen.first + chosen.count; ++i) {
+      model_.states[swept_[i]] = begin_[swept_[i]];
+    }
   }
-  return drive;
+  if (groups.empty()) return;
+  const auto each_group = [&](const auto& visit) {
+    threads::parallel_parts(groups.size(), kGrain, [&](std::size_t from, std::size_t to) {
+      for (std::size_t i = from; i < to; ++i) visit(groups[i]);
+    });
+  };
+  std::vector<double> off_k(islands.size());
+  for (std::size_t k = 0; k < window.count; ++k) {
+    // Expect the change that is known, else the one of the interval before.
+    for (const std::uint32_t i : islands) {
+      for (const std::uint32_t c : columns_.columns(i)) {
+        if (known_[i] != 0) fronts_[c].change_k = fronts_[c].known_change_k[k];
+      }
+    }
+    for (int round = 0; round < kMostColumnRounds; ++round) {
+      each_group([&](std::size_t group) { begin_columns(group, window, k); });
+      threads::parallel_parts(islands.size(), 1, [&](std::size_t from, std::size_t to) {
+        for (std::size_t i = from; i < to; ++i) {
+          off_k[i] = 0.0;
+          const bool known = known_[islands[i]] != 0 || round != 0;
+          for (const std::uint32_t c : columns_.columns(islands[i])) {
+            const SampleState& begin = fronts_[c].next;
+            for (std::size_t l = 0; l < physics::kMaxColumnCells; ++l) {
+              columns_.cells_k(c)[l] =
+                  known ? fronts_[c].known_k[k][l]
+                        : columns_.equations(c).alone_k[l] + begin.cells_k[l] - begin.alone_k[l];
+            }
+          }
+          columns_.solve(islands[i]);
+          for (const std::uint32_t c : columns_.columns(islands[i])) {
+            Front& front = fronts_[c];
+            for (std::size_t l = 0; l < physics::kMaxColumnCells; ++l) {
+              front.known_k[k][l] = static_cast<float>(columns_.cells_k(c)[l]);
+            }
+            const double change_k =
+                columns_.cells_k(c)[0] - columns_.equations(c).alone_k[0] - front.next.aside_k();
+            off_k[i] = std::max(off_k[i], std::abs(change_k - front.change_k));
+            front.change_k = change_k;
+            front.known_change_k[k] = static_cast<float>(change_k);
+          }
+        }
+      });
+      if (std::ranges::max(off_k) < kColumnsAgreeK) break;
+    }
+    each_group([&](std::size_t group) { end_columns(group, window, k); });
+  }
+  for (const std::uint32_t i : islands) {
+    known_[i] = 1;
+    needed_[i] = 0;
+  }
+}
+
+void Sweeper::carry_columns(std::size_t group, const Window& window) {
+  const BodyCourses::Group& chosen = bodies_->groups()[group];
+  std::array<SampleAdvance, kAdvanceTogether> advances;
+  std::array<SampleState, kAdvanceTogether> states;
+  for (std::size_t i = 0; i < chosen.count; ++i) {
+    states[i] = begin_[swept_[chosen.first + i]];
+    advances[i].sample = &model_.samples.samples[swept_[chosen.first + i]];
+    advances[i].state = &states[i];
+  }
+  for (std::size_t k = 0; k < window.count; ++k) {
+    const std::size_t j = window.first + k;
+    const HeatInterval& interval = in_.record.intervals[j];
+    for (std::size_t i = 0; i < chosen.count; ++i) {
+      const std::uint32_t s = swept_[chosen.first + i];
+      SampleAdvance& advance = advances[i];
+      advance.normal = in_.record.rays[j].normal(*advance.sample);
+      advance.drive = drive(s, advance.normal, window, k);
+      advance.drive.aside.change_k = fronts_[column(s)].known_change_k[k];
+      if (j != 0) continue;
+      row_of(s, window)[0] = in_.heat
+                                 .output(*advance.sample, advance.normal, interval.forcing.begin,
+                                         advance.drive, states[i])
+                                 .longwave_out_w_m2;
+    }
+    in_.heat.advance_all(std::span(advances).first(chosen.count), interval);
+    for (std::size_t i = 0; i < chosen.count; ++i) {
+      const std::uint32_t s = swept_[chosen.first + i];
+      SampleAdvance& advance = advances[i];
+      // Only what neighbours add to the surface is known here: cells alone stand for nothing.
+      states[i].cells_k[0] += fronts_[column(s)].known_change_k[k];
+      advance.drive.longwave_begin_w_m2 = advance.drive.longwave_end_w_m2;
+      const SampleOutput output = in_.heat.output(*advance.sample, advance.normal,
+                                                  interval.forcing.end, advance.drive, states[i]);
+      row_of(s, window)[1 + k] = output.longwave_out_w_m2;
+      row_of(s, window)[window.count + 1 + k] = output.shortwave_out_w_m2;
+    }
+  }
+}
+
+void Sweeper::begin_columns(std::size_t group, const Window& window, std::size_t k) noexcept {
+  const BodyCourses::Group& chosen = bodies_->groups()[group];
+  const std::size_t j = window.first + k;
+  const HeatInterval& interval = in_.record.intervals[j];
+  std::array<SampleAdvance, kAdvanceTogether> advances;
+  for (std::size_t i = 0; i < chosen.count; ++i) {
+    const std::uint32_t s = swept_[chosen.first + i];
+    const SurfaceSample& sample = model_.samples.samples[s];
+    Front& front = fronts_[sample.column];
+    SampleAdvance& advance = advances[i];
+    advance.sample = &sample;
+    advance.normal = in_.record.rays[j].normal(sample);
+    front.drive = drive(s, advance.normal, window, k);
+    front.next = model_.states[s];
+    if (j == 0) {
+      row_of(s, window)[0] =
+          in_.heat.output(sample, advance.normal, interval.forcing.begin, front.drive, front.next)
+              .longwave_out_w_m2;
+    }
+    advance.drive = front.drive;
+    advance.drive.aside = {&model_.samples.columns[sample.column], nullptr,
+                           &columns_.equations(sample.column), front.change_k};
+    advance.state = &front.next;
+  }
+  in_.heat.advance_all(std::span(advances).first(chosen.count), interval);
+}
+
+void Sweeper::end_columns(std::size_t group, const Window& window, std::size_t k) noexcept {
+  const BodyCourses::Group& chosen = bodies_->groups()[group];
+  const std::size_t j = window.first + k;
+  for (std::size_t i = 0; i < chosen.count; ++i) {
+    const std::uint32_t s = swept_[chosen.first + i];
+    const SurfaceSample& sample = model_.samples.samples[s];
+    Front& front = fronts_[sample.column];
+    if (j == 0 && chosen.body >= 0) bodies_->add(group, 0, s, model_.states[s]);
+    keep_cells(columns_.equations(sample.column).alone_k, columns_.cells_k(sample.column),
+               front.next);
+    model_.states[s] = front.next;
+    // Take what arrives at the end of the interval.
+    front.drive.longwave_begin_w_m2 = front.drive.longwave_end_w_m2;
+    SampleOutput& output = model_.outputs[s];
+    output = in_.heat.output(sample, in_.record.rays[j].normal(sample),
+                             in_.record.intervals[j].forcing.end, front.drive, front.next);
+    float* const row_w_m2 = row_of(s, window);
+    row_w_m2[1 + k] = output.longwave_out_w_m2;
+    row_w_m2[window.count + 1 + k] = output.shortwave_out_w_m2;
+    if (chosen.body >= 0) bodies_->add(group, j + 1, s, front.next);
+  }
 }
 
 void Sweeper::carry(std::size_t group, const Window& window) {
@@ -478,8 +666,6 @@ void Sweeper::carry(std::size_t group, const Window& window) {
   // Keep what a sample sends at node k of the window, or over interval k and at its end.
   const auto keep_node = [&](std::uint32_t s, std::size_t k, const SampleOutput& output) {
     row_of(s, window)[k] = output.longwave_out_w_m2;
-    if (flux_row_[s] == kNoList) return;
-    flux_w_m2_.row(flux_row_[s])[window.first + k] = output.flux_w_m2;
   };
   const auto keep_end = [&](std::uint32_t s, std::size_t k, const SampleOutput& output) {
     keep_node(s, k + 1, output);
@@ -510,7 +696,7 @@ void Sweeper::carry(std::size_t group, const Window& window) {
       const std::uint32_t s = samples[i];
       SampleAdvance& front = fronts[i];
       front.normal = in_.record.rays[j].normal(*front.sample);
-      front.drive = whole_drive(s, front.normal, window, k);
+      front.drive = drive(s, front.normal, window, k);
       const bool first = j == 0;
       if (first) {
         add_to_body(i, 0, states[i]);
@@ -563,11 +749,10 @@ SampleHistories take_histories(const SurfaceInputs& inputs, std::vector<SurfaceP
   out.start.resize(count);
   model.states.resize(count);
   model.outputs.resize(count);
-  // Go through the patches. The partners' patch follows the drawn samples.
+  // Go through the patches.
   for (std::size_t p = 0; p < out.patches.size(); ++p) {
     SurfacePatch& patch = out.patches[p];
-    const std::size_t first =
-        p < model.first_sample.size() ? model.first_sample[p] : model.drawn_samples;
+    const std::size_t first = model.first_sample[p];
     const bool keeps = patch.sent.length() != 0;
     const auto rows_of = [](SurfacePatch& side, std::size_t vertex) {
       return SampleHistories::Rows{side.sun_frac.row(vertex), side.hidden_sky.row(vertex),
@@ -586,17 +771,10 @@ SampleHistories take_histories(const SurfaceInputs& inputs, std::vector<SurfaceP
     }
     patch.free_all_but_rows();
   }
-  // Start the modes that a partner drives like that partner's own modes, with the weight of its
-  // flux (physics.md eq. 22).
-  for (std::size_t s = 0; s < count; ++s) {
-    for (std::size_t p = 0; p < kMaxPartners; ++p) {
-      const Partner& partner = model.samples.samples[s].partners[p];
-      if (partner.sample == kNoSample) continue;
-      for (std::size_t m = 0; m < physics::kMaxFosterModes; ++m) {
-        out.start[s].partner_k[p][m] =
-            partner.weight_frac[m] * out.start[partner.sample].modes_k[m];
-      }
-    }
+  // Start the columns with the profile of the time before.
+  for (const SampleColumn& column : model.samples.columns) {
+    inputs.heat.foster()->begin_column(model.samples.samples[column.sample],
+                                       out.start[column.sample]);
   }
   return out;
 }

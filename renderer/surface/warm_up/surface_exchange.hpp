@@ -46,8 +46,9 @@ struct ExchangeOptions {
 /// Integrates all samples over the record, with the radiation that the others send meanwhile. The
 /// record is cut into windows of a few intervals; within each, the radiation is iterated until its
 /// residual is below kExchangeResidual_w_m2 (physics.md eq. 20), with mixed steps where plain ones
-/// are slow. The result does not depend on the order of samples. Fluxes of partners (eq. 22) and
-/// interiors of bodies take several passes over the record, of which the last one iterates. Fills
+/// are slow. The result does not depend on the order of samples. Columns
+/// (eq. 22) are integrated together, interval by interval. Interiors of bodies take several passes
+/// over the record, of which the last one iterates. Fills
 /// states and outputs of the model; samples that exchange nothing are left as they are. Uses all
 /// cores. Returns false when `report` stopped it.
 [[nodiscard]] bool exchange(const SurfaceInputs& inputs, const ExchangeOptions& options,

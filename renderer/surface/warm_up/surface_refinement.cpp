@@ -46,10 +46,19 @@ constexpr float kSurplusFrac = 1.2F;
 constexpr float kSharpSurplusFrac = 8.0F;
 /// Error of a triangle that a foot runs through, in tolerances.
 constexpr float kFootFrac = 30.0F;
-/// Time in s and distance from an edge within which samples lie as close as heat spreads in that
-/// time. The distance is in depths of that spread.
-constexpr float kCreaseS = 1000.0F;
-constexpr float kCreaseDepths = 3.0F;
+/// Samples at an edge lie as close as heat spreads in that time, s, or as this share of the length
+/// over which a thin layer conducts against losses of that many W m-2 K-1. Farther off they lie
+/// this share of the distance from the edge apart.
+constexpr double kCreaseS = 100.0;
+constexpr double kSkinFrac = 1.0 / 3.0;
+constexpr double kSkinLossesW_m2_k = 19.0;
+constexpr float kCreaseFrac = 0.7F;
+/// Distance from an edge up to which that holds, in thicknesses of the stack, and error of a
+/// coarser triangle, in tolerances.
+constexpr double kCreaseThicknesses = 1.0;
+constexpr float kCreaseTolerances = 3.0F;
+/// Shortest edges that are halved for it, in pixels.
+constexpr float kMinCreasePx = 2.0F;
 /// Allowed error from facing elsewhere, in tolerances, for large triangles and for those of a few
 /// pixels.
 constexpr float kBendFrac = 1.0F;
@@ -113,7 +122,17 @@ SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs,
       lateral_(options.lateral),
       judged_(inputs.geometry.meshes.size()) {
   for (const scene::Material& material : inputs.materials) {
-    diffusivity_m2_s_.push_back(static_cast<float>(diffusivity_m2_s(material)));
+    CreaseSize size;
+    if (const double a = diffusivity_m2_s(material); a > 0.0) {
+      const scene::Layer& outer = material.layers.front();
+      size.least_m = static_cast<float>(std::min(
+          std::sqrt(a * kCreaseS),
+          kSkinFrac * std::sqrt(outer.conductivity_w_m_k * outer.thickness_m / kSkinLossesW_m2_k)));
+      for (const scene::Layer& layer : material.layers) {
+        size.reach_m += static_cast<float>(kCreaseThicknesses * layer.thickness_m);
+      }
+    }
+    crease_sizes_.push_back(size);
   }
   // Bring the eyes into rel axes, and for each entity to where its script brings it into view.
   for (const RefineView::Eye& eye : view.eyes) {
@@ -328,11 +347,12 @@ SurfaceRefinement::Judged SurfaceRefinement::need(const RefinedMesh& refined, st
   const int under = covered(0) + covered(1) + covered(2);
   if (smooth && under > 0 && under < 3) error_k = std::max(error_k, kFootFrac * tolerance_k_);
   // Halve near edges and feet, because heat also moves along the surface there.
-  const float depth_m = std::sqrt(diffusivity_m2_s_[vertices[leaf[0]].material] * kCreaseS);
+  const CreaseSize& crease = crease_sizes_[vertices[leaf[0]].material];
   const auto flat_m = [&](std::size_t i) { return patch.samples[leaf[i]].flat_m; };
-  if (smooth && lateral_ && longest_m > depth_m &&
-      std::min({flat_m(0), flat_m(1), flat_m(2)}) < kCreaseDepths * depth_m) {
-    error_k = std::max(error_k, tolerance_k_);
+  const float away_m = std::min({flat_m(0), flat_m(1), flat_m(2)});
+  if (edge_px > kMinCreasePx && lateral_ && away_m < crease.reach_m &&
+      longest_m > std::max(crease.least_m, kCreaseFrac * away_m)) {
+    error_k = std::max(error_k, kCreaseTolerances * tolerance_k_);
   }
   // Look for edges of shadows, on both faces of a sheet. Rays come last because they are expensive.
   if (edge_px >= kEdgeSunPx) {

@@ -105,8 +105,14 @@ class SurfaceRefinement {
   float field_rad_ = 0.0F;
   float tolerance_k_ = 0.1F;
   bool lateral_ = true;
-  std::vector<float> diffusivity_m2_s_;  ///< diffusivity of the first layer, by material
-  std::size_t recent_ = 0;               ///< first interval that counts as recent
+  /// Width of triangles at an edge, and distance from it up to which they grow; 0 where heat does
+  /// not move along the surface.
+  struct CreaseSize {
+    float least_m = 0.0F;
+    float reach_m = 0.0F;
+  };
+  std::vector<CreaseSize> crease_sizes_;  ///< by material
+  std::size_t recent_ = 0;                ///< first interval that counts as recent
   /// Judgement of a leaf: the node of the mesh that was judged, and its need.
   struct Judged {
     std::uint32_t node = 0xffffffffU;

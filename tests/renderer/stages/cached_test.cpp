@@ -183,7 +183,7 @@ TEST(RendererCached, WarmUpReportsAndStops) {
     EXPECT_TRUE(warm_up_warnings(run.renderer().scene_stats()).empty());
   }
   EXPECT_GT(reports, 4);
-  // Every report can stop it: those of samples, of their partners and of the exchange.
+  // Every report can stop it: those of samples and of the exchange.
   for (int stop = 1; stop <= reports; ++stop) {
     Session run(scenario);
     int seen = 0;
@@ -210,8 +210,8 @@ TEST(RendererCached, TheLimitOfSamplesIsKeptAndSaid) {
   EXPECT_NE(warnings[0].find("600 or more"), std::string::npos) << warnings[0];
 }
 
-TEST(RendererCached, TheLimitOfSamplesHoldsWithThoseAcrossEdges) {
-  // Most samples of small blocks have partners across their edges.
+TEST(RendererCached, TheLimitOfSamplesHoldsBesideEdges) {
+  // Small blocks are refined most near their edges.
   std::vector<Quad> quads = box({-0.4, -0.4, 0.0}, {0.4, 0.4, 0.8});
   for (int i = 0; i < 6; ++i) {
     const double x_m = 1.5 * i - 4.0;

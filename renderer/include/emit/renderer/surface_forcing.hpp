@@ -52,6 +52,8 @@ struct FosterMaterial {
   double roughness = 1.0;  ///< factor of the forced part of the film (physics.md eq. 34)
   bool sheet = false;      ///< driven by the mean of the fluxes that its two faces receive
   bool body = false;       ///< the base is the interior of a body, which starts at base_k
+  /// Layers in which heat moves sideways; empty for sheets and for prescribed temperatures.
+  std::vector<physics::StackLayer> layers;
   physics::FosterState<double> base_shares{};  ///< shares c_i of the modes in a change of the base
 
   [[nodiscard]] bool prescribed() const noexcept { return network.count == 0; }

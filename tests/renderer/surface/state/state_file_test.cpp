@@ -31,6 +31,9 @@ StateKey some_key() {
 }
 
 /// An octahedron of which some leaves are halved, and samples without two equal members.
+/// Number of samples that have a column.
+constexpr std::uint32_t kColumns = 3;
+
 struct World {
   scene::SceneGeometry geometry;
   SurfaceModel model;
@@ -66,14 +69,25 @@ struct World {
       sample.open_frac[2] = number();
       sample.open_before_frac[3] = number();
       sample.flat_m = number();
-      sample.partners[1] = {i, number(), {number(), number(), number(), number()}};
+      if (i < kColumns) {
+        sample.column = i;
+        SampleColumn column;
+        column.sample = i;
+        column.share_frac[2] = number();
+        column.below_w_m2_k[3] = number();
+        column.first_link.fill(i);
+        column.first_link.back() = i + 1;
+        model.samples.columns.push_back(column);
+        model.samples.links.push_back({kColumns - 1 - i, i % 8, number()});
+      }
       model.samples.samples.push_back(sample);
       model.samples.seen.push_back({count - 1 - i, number()});
       SampleState state;
       state.modes_k[1] = number();
-      state.partner_k[1][3] = number();
+      state.cells_k[1] = number();
+      state.alone_k[7] = number();
       model.states.push_back(state);
-      model.outputs.push_back({number(), number(), number(), number(), number()});
+      model.outputs.push_back({number(), number(), number(), number()});
     }
     std::vector<float> value_k(model.drawn_samples);
     for (float& value : value_k) value = number();
@@ -175,19 +189,27 @@ TEST_F(StateFile, gives_back_what_was_written_and_leaves_nothing_beside_it) {
     EXPECT_EQ(a.seen_count, b.seen_count);
     EXPECT_EQ(a.seen_scale, b.seen_scale);
     EXPECT_EQ(a.flat_m, b.flat_m);
-    EXPECT_EQ(a.partners[0].sample, kNoSample);
-    EXPECT_EQ(a.partners[1].sample, b.partners[1].sample);
-    EXPECT_EQ(a.partners[1].distance_m, b.partners[1].distance_m);
-    EXPECT_EQ(a.partners[1].weight_frac, b.partners[1].weight_frac);
+    EXPECT_EQ(a.column, b.column);
     EXPECT_EQ(got->states[i].modes_k, model.states[i].modes_k);
-    EXPECT_EQ(got->states[i].partner_k, model.states[i].partner_k);
+    EXPECT_EQ(got->states[i].cells_k, model.states[i].cells_k);
+    EXPECT_EQ(got->states[i].alone_k, model.states[i].alone_k);
     EXPECT_EQ(got->outputs[i].offset_k, model.outputs[i].offset_k);
     EXPECT_EQ(got->outputs[i].sun_frac, model.outputs[i].sun_frac);
     EXPECT_EQ(got->outputs[i].longwave_out_w_m2, model.outputs[i].longwave_out_w_m2);
     EXPECT_EQ(got->outputs[i].shortwave_out_w_m2, model.outputs[i].shortwave_out_w_m2);
-    EXPECT_EQ(got->outputs[i].flux_w_m2, model.outputs[i].flux_w_m2);
     EXPECT_EQ(got->samples.seen[i].sample, model.samples.seen[i].sample);
     EXPECT_EQ(got->samples.seen[i].weight_frac, model.samples.seen[i].weight_frac);
+  }
+  ASSERT_EQ(got->samples.columns.size(), kColumns);
+  ASSERT_EQ(got->samples.links.size(), kColumns);
+  for (std::size_t i = 0; i < kColumns; ++i) {
+    EXPECT_EQ(got->samples.columns[i].sample, model.samples.columns[i].sample);
+    EXPECT_EQ(got->samples.columns[i].share_frac, model.samples.columns[i].share_frac);
+    EXPECT_EQ(got->samples.columns[i].below_w_m2_k, model.samples.columns[i].below_w_m2_k);
+    EXPECT_EQ(got->samples.columns[i].first_link, model.samples.columns[i].first_link);
+    EXPECT_EQ(got->samples.links[i].column, model.samples.links[i].column);
+    EXPECT_EQ(got->samples.links[i].cell, model.samples.links[i].cell);
+    EXPECT_EQ(got->samples.links[i].conductance_w_m2_k, model.samples.links[i].conductance_w_m2_k);
   }
   ASSERT_EQ(got->drawn.size(), 1U);
   EXPECT_EQ(got->drawn[0].indices, model.drawn[0].indices);
@@ -312,9 +334,15 @@ TEST_F(StateFile, huge_counts_and_indices_out_of_range_are_refused_though_the_ch
     for (const SurfaceSample& sample : got->samples.samples) {
       ASSERT_LE(sample.first_seen + sample.seen_count, got->samples.seen.size());
       ASSERT_LT(sample.entity, static_cast<std::int32_t>(kEntities));
-      for (const Partner& partner : sample.partners) {
-        ASSERT_TRUE(partner.sample == kNoSample || partner.sample < count);
-      }
+      ASSERT_TRUE(sample.column == kNoSample || sample.column < got->samples.columns.size());
+    }
+    for (const SampleColumn& column : got->samples.columns) {
+      ASSERT_LT(column.sample, count);
+      ASSERT_LE(column.first_link.back(), got->samples.links.size());
+    }
+    for (const CellLink& link : got->samples.links) {
+      ASSERT_LT(link.column, got->samples.columns.size());
+      ASSERT_LT(link.cell, physics::kMaxColumnCells);
     }
     for (const SeenSample& seen : got->samples.seen) ASSERT_LT(seen.sample, count);
     for (const std::uint32_t v : got->drawn[0].indices) ASSERT_LT(v, got->drawn_samples);

@@ -1,0 +1,341 @@
+// SPDX-License-Identifier: Apache-2.0
+// Heat along the surface of bodies near their edges: the cells of columns, and what they do.
+#include "surface/warm_up/surface_columns.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <map>
+#include <memory>
+#include <optional>
+#include <random>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "emit/physics/constants.hpp"
+#include "history/foster_setup.hpp"
+#include "renderer/surface/surface_scene.hpp"
+#include "support/times.hpp"
+#include "surface/model/vertex_areas.hpp"
+#include "surface/run/cached_surface.hpp"
+#include "surface/warm_up/surface_exchange.hpp"
+
+namespace emit::renderer {
+namespace {
+
+using emit::test::kSecondNs;
+using physics::kReferenceK;
+
+/// Body of cubes: every face of a cube that no other cube touches is a square of its own.
+scene::Mesh cubes(const std::function<bool(int, int, int)>& filled, float size_m) {
+  constexpr int kMost = 3;
+  scene::Mesh mesh;
+  for (int x = 0; x < kMost; ++x) {
+    for (int y = 0; y < kMost; ++y) {
+      for (int z = 0; z < kMost; ++z) {
+        if (!filled(x, y, z)) continue;
+        for (int axis = 0; axis < 3; ++axis) {
+          for (const int side : {-1, 1}) {
+            std::array<int, 3> next{x, y, z};
+            next[static_cast<std::size_t>(axis)] += side;
+            const bool inside =
+                std::ranges::all_of(next, [](int v) { return v >= 0 && v < kMost; });
+            if (inside && filled(next[0], next[1], next[2])) continue;
+            // Corners go round so that the normal points outwards.
+            glm::vec3 u(0.0F);
+            glm::vec3 v(0.0F);
+            u[(axis + 1) % 3] = size_m;
+            v[(axis + 2) % 3] = size_m;
+            if (side < 0) std::swap(u, v);
+            glm::vec3 low = size_m * glm::vec3(x, y, z);
+            if (side > 0) low[axis] += size_m;
+            test::add_quad(mesh, {low, low + u, low + u + v, low + v});
+          }
+        }
+      }
+    }
+  }
+  mesh.closed = true;
+  return mesh;
+}
+scene::Mesh box(float size_m) {
+  return cubes([](int, int, int) { return true; }, size_m / 3.0F);
+}
+/// L with arms of one cube.
+scene::Mesh ell(float size_m) {
+  return cubes([](int x, int y, int) { return x == 0 || y == 0; }, size_m / 3.0F);
+}
+/// Slab with a rib along its middle.
+scene::Mesh rib(float size_m) {
+  return cubes([](int x, int, int z) { return z == 0 || (z == 1 && x == 1); }, size_m / 3.0F);
+}
+
+/// A body high in the air, in the sun of a June morning.
+class Body {
+ public:
+  Body(scene::Mesh mesh, std::vector<scene::Layer> layers, bool lateral) {
+    scenario_.place = {48.56 * physics::kDegree, 11.26 * physics::kDegree, 380.0};
+    scenario_.epoch_utc_ns = 1'403'330'400 * kSecondNs;  // 2014-06-21 06:00 UTC
+    scenario_.thermal.model = scene::ThermalModel::foster;
+    scenario_.thermal.method = scene::ThermalMethod::cached;
+    scenario_.thermal.steps = 48;
+    scenario_.thermal.spacing = scene::StepSpacing::geometric;
+    scenario_.thermal.history_start_ns = -24 * 3600 * kSecondNs;
+    scenario_.thermal.lateral = lateral;
+    scenario_.thermal.exchange = false;
+    scene::WeatherSample weather;
+    weather.direct_normal_w_m2 = 800.0;
+    weather.diffuse_horizontal_w_m2 = 100.0;
+    weather.longwave_down_w_m2 = 330.0;
+    weather.air_k = 293.15;
+    weather.environment_k = 293.15;
+    weather.film_w_m2_k = 13.0;
+    scenario_.weather = {weather};
+    scene::Material material;
+    material.name = "stack";
+    material.emissivity_frac = 0.9;
+    material.solar_absorptance_frac = 0.7;
+    material.layers = std::move(layers);
+    material.base_k = 293.15;
+    scenario_.materials = {material};
+    scenario_.default_material = "stack";
+    scene_.add_static(std::move(mesh), glm::dvec3(0.0, 0.0, 50.0));
+    scene_.geometry.materials = scenario_.materials;
+    scenario_.objects.resize(1);
+  }
+
+  /// Replaces the weather and the radiation of the body: there is none.
+  void hang_in_air(std::vector<scene::WeatherSample> weather, double base_k) {
+    scenario_.weather = std::move(weather);
+    for (scene::Material* material :
+         {scenario_.materials.data(), scene_.geometry.materials.data()}) {
+      material->emissivity_frac = 1e-9;
+      material->solar_absorptance_frac = 0.0;
+      material->base_k = base_k;
+      material->initial_k = base_k;
+    }
+  }
+  void step(std::uint32_t steps) { scenario_.thermal.steps = steps; }
+  void look_closely(double pixel_rad) { pixel_rad_ = pixel_rad; }
+
+  void warm_up() {
+    environment_.emplace(scenario_);
+    auto networks = build_foster_materials(scenario_, scene_.geometry.materials);
+    ASSERT_TRUE(networks.has_value()) << networks.error().text;
+    auto surface =
+        CachedSurface::create(scenario_, scene_.geometry, {-1},
+                              std::span(*networks).first(networks->size() - 1), kReferenceK);
+    ASSERT_TRUE(surface.has_value()) << surface.error().text;
+    surface_ = std::move(*surface);
+    history_.emplace(scenario_.thermal.steps,
+                     make_foster(scenario_, std::move(*networks), *environment_, kReferenceK));
+    StepPlan plan(scenario_.thermal);
+    const RefineView view{{{{0.0, -4.0, 52.0}, {}}}, pixel_rad_};
+    ASSERT_TRUE(surface_->prepare(3 * 3600 * kSecondNs, view, {*environment_, {}}, plan, *history_,
+                                  std::nullopt, {}));
+  }
+  void advance(std::int64_t now_ns) { surface_->advance(now_ns, {*environment_, {}}, *history_); }
+  [[nodiscard]] const SurfaceModel& model() const { return surface_->model(); }
+  [[nodiscard]] const scene::Instance& instance() const { return scene_.geometry.instances[0]; }
+  [[nodiscard]] const std::vector<scene::Layer>& layers() const {
+    return scenario_.materials[0].layers;
+  }
+  /// Corner of the body at its origin, in the axes of the samples.
+  [[nodiscard]] glm::dvec3 origin_m() const {
+    glm::dvec3 low(1e9);
+    for (const SurfaceSample& sample : model().samples.samples) {
+      low = glm::min(low, glm::dvec3(sample.position_m));
+    }
+    return low;
+  }
+  [[nodiscard]] std::size_t samples() const { return model().drawn_samples; }
+  [[nodiscard]] double temperature_k(std::size_t sample, std::size_t node = 0) const {
+    return kReferenceK + static_cast<double>(surface_->vertices(node)[sample].offset_k);
+  }
+
+ private:
+  scene::ScenarioDesc scenario_;
+  double pixel_rad_ = 2e-2;
+  test::SurfaceScene scene_;
+  std::optional<Environment> environment_;
+  std::optional<SurfaceHistory> history_;
+  std::unique_ptr<CachedSurface> surface_;
+};
+
+std::vector<scene::Layer> concrete(double thickness_m) {
+  return {{thickness_m, 1.28, 2300.0, 878.0}};
+}
+
+TEST(SurfaceColumns, ShareTheMaterialBelowTheSurfaceWithoutGapOrOverlap) {
+  // Bodies whose stack is thinner than half of every arm: what lies within the stack is known.
+  constexpr double kDepthM = 0.2;
+  struct Case {
+    scene::Mesh mesh;
+    double held_m3;
+  };
+  const std::vector<Case> cases{
+      {box(1.5F), std::pow(1.5, 3.0) - std::pow(1.1, 3.0)},
+      // Arms of 0.5 m, 1.5 m long and 1.5 m high.
+      {ell(1.5F), (1.5 * 1.5 - 1.0) * 1.5 - (1.1 * 1.1 - 1.0) * 1.1},
+  };
+  for (const Case& each : cases) {
+    Body body(each.mesh, concrete(kDepthM), true);
+    ASSERT_NO_FATAL_FAILURE(body.warm_up());
+    const SurfaceModel& model = body.model();
+    const physics::ColumnCells cells =
+        physics::column_cells(std::vector<physics::StackLayer>{{kDepthM, 1.28, 2300.0 * 878.0}});
+    const auto area_m2 = vertex_areas_m2(model.meshes[0], body.instance());
+    double held_m3 = 0.0;
+    for (std::uint32_t s = 0; s < model.drawn_samples; ++s) {
+      const std::uint32_t column = model.samples.samples[s].column;
+      for (std::size_t l = 0; l < cells.count; ++l) {
+        // A sample in the middle of a face has the whole stack for itself.
+        const double share_frac =
+            column == kNoSample ? 1.0 : model.samples.columns[column].share_frac[l];
+        held_m3 += static_cast<double>(area_m2[s]) * share_frac * cells.thickness_m(l);
+      }
+    }
+    EXPECT_NEAR(held_m3, each.held_m3, 0.03 * each.held_m3);
+  }
+}
+
+TEST(SurfaceColumns, ConductAlikeInBothDirectionsAndNeverBackwards) {
+  for (const scene::Mesh& mesh : {box(0.6F), ell(0.6F), rib(0.6F)}) {
+    Body body(mesh, {{0.002, 50.0, 7800.0, 470.0}, {0.05, 0.04, 30.0, 900.0}}, true);
+    ASSERT_NO_FATAL_FAILURE(body.warm_up());
+    const SurfaceModel& model = body.model();
+    const auto area_m2 = vertex_areas_m2(model.meshes[0], body.instance());
+    std::map<std::tuple<std::uint32_t, std::size_t, std::uint32_t, std::uint32_t>, double> found;
+    const auto& columns = model.samples.columns;
+    for (std::uint32_t c = 0; c < columns.size(); ++c) {
+      for (std::size_t l = 0; l < physics::kMaxColumnCells; ++l) {
+        for (std::uint32_t k = columns[c].first_link[l]; k < columns[c].first_link[l + 1]; ++k) {
+          const CellLink& link = model.samples.links[k];
+          EXPECT_GT(link.conductance_w_m2_k, 0.0F);
+          found[{c, l, link.column, link.cell}] =
+              static_cast<double>(link.conductance_w_m2_k) * area_m2[columns[c].sample];
+        }
+      }
+    }
+    ASSERT_GT(found.size(), 1000U);
+    for (const auto& [key, conductance_w_k] : found) {
+      const auto& [c, l, other, m] = key;
+      const auto back = found.find({other, m, c, static_cast<std::uint32_t>(l)});
+      ASSERT_NE(back, found.end());
+      EXPECT_NEAR(back->second, conductance_w_k, 1e-4 * conductance_w_k);
+    }
+  }
+}
+
+/// Share of the step of the air's temperature that a half space has not followed at a depth, with a
+/// film h (Carslaw and Jaeger, Conduction of Heat in Solids, 2.7): the product of these shares over
+/// the directions solves the problem for an edge or a corner.
+double still_frac(double depth_m, double t_s, double conductivity_w_m_k, double diffusivity_m2_s,
+                  double film_w_m2_k) {
+  const double spread_m = std::sqrt(diffusivity_m2_s * t_s);
+  const double h = film_w_m2_k / conductivity_w_m_k;
+  return std::erf(0.5 * depth_m / spread_m) +
+         std::exp(h * depth_m + h * h * spread_m * spread_m) *
+             std::erfc(0.5 * depth_m / spread_m + h * spread_m);
+}
+
+TEST(SurfaceColumns, EdgesAndCornersFollowTheAirAsTheClosedFormSays) {
+  constexpr double kFilm = 20.0;
+  constexpr double kFromK = 280.0;
+  constexpr double kToK = 320.0;
+  constexpr double kSizeM = 0.6;
+  constexpr double kSeconds = 3.0 * 3600.0;
+  Body body(box(static_cast<float>(kSizeM)), concrete(0.3), true);
+  std::vector<scene::WeatherSample> weather(4);
+  for (scene::WeatherSample& sample : weather) {
+    sample.film_w_m2_k = kFilm;
+    sample.air_k = kFromK;
+  }
+  weather[0].sim_time_ns = -1'000'000 * kSecondNs;
+  weather[2].sim_time_ns = kSecondNs;
+  weather[3].sim_time_ns = 1'000'000 * kSecondNs;
+  weather[2].air_k = weather[3].air_k = kToK;
+  body.hang_in_air(weather, kFromK);
+  body.step(300);
+  body.look_closely(3e-3);
+  ASSERT_NO_FATAL_FAILURE(body.warm_up());
+  const double diffusivity_m2_s = 1.28 / (2300.0 * 878.0);
+  double squares = 0.0;
+  double most_k = 0.0;
+  std::size_t seen = 0;
+  for (std::size_t s = 0; s < body.samples(); ++s) {
+    const glm::dvec3 at_m =
+        glm::dvec3(body.model().samples.samples[s].position_m) - body.origin_m();
+    // Judge the two faces that the camera sees: only they have fine triangles.
+    if (at_m.y > 0.01 && at_m.z < kSizeM - 0.01) continue;
+    double share = 1.0;
+    for (int i = 0; i < 3; ++i) {
+      const auto one_sided = [&](double depth_m) {
+        return still_frac(std::max(depth_m, 0.0), kSeconds, 1.28, diffusivity_m2_s, kFilm);
+      };
+      share *= one_sided(at_m[i]) + one_sided(kSizeM - at_m[i]) - 1.0;
+    }
+    const double off_k = body.temperature_k(s) - (kToK - (kToK - kFromK) * share);
+    ++seen;
+    squares += off_k * off_k;
+    most_k = std::max(most_k, std::abs(off_k));
+  }
+  ASSERT_GT(seen, 1000U);
+  RecordProperty("rms_k", std::to_string(std::sqrt(squares / static_cast<double>(seen))));
+  RecordProperty("most_k", std::to_string(most_k));
+  // Edges are 9 K warmer than the middle of a face, and corners 12 K.
+  EXPECT_LT(std::sqrt(squares / static_cast<double>(seen)), 0.35);
+  EXPECT_LT(most_k, 1.0);
+}
+
+/// Coldest and warmest temperature that a surface can take in the weather of Body if it stores
+/// nothing and conducts nothing.
+std::pair<double, double> range_k() {
+  const auto balance_k = [](double absorbed_w_m2) {
+    double low = 200.0;
+    double high = 400.0;
+    for (int i = 0; i < 60; ++i) {
+      const double t = 0.5 * (low + high);
+      const double lost =
+          0.9 * physics::kStefanBoltzmannWPerM2K4 * std::pow(t, 4.0) + 13.0 * (t - 293.15);
+      (lost < absorbed_w_m2 ? low : high) = t;
+    }
+    return low;
+  };
+  const double air = 0.9 * physics::kStefanBoltzmannWPerM2K4 * std::pow(293.15, 4.0);
+  // The sun stands on a face at most, with all of the sky and as much light from the ground.
+  return {balance_k(std::min(0.9 * 330.0, air)), balance_k(0.7 * (800.0 + 300.0) + air)};
+}
+
+TEST(SurfaceColumns, KeepAnyStackWithinWhatItsSurroundingsAllow) {
+  std::mt19937_64 random(7);
+  const auto between = [&random](double low, double high) {
+    return low * std::pow(high / low, std::uniform_real_distribution<>(0.0, 1.0)(random));
+  };
+  const std::array<scene::Mesh, 3> shapes{box(1.5F), ell(1.5F), rib(1.5F)};
+  const auto [low_k, high_k] = range_k();
+  for (int n = 0; n < 30; ++n) {
+    std::vector<scene::Layer> layers(std::uniform_int_distribution<std::size_t>(1, 4)(random));
+    for (scene::Layer& layer : layers) {
+      layer = {between(2e-4, 0.5), between(0.02, 400.0), between(20.0, 8000.0), 900.0};
+    }
+    Body body(shapes[static_cast<std::size_t>(n) % shapes.size()], layers, true);
+    ASSERT_NO_FATAL_FAILURE(body.warm_up());
+    for (int i = 1; i <= 60; ++i) body.advance((3 * 3600 + 10 * i) * kSecondNs);
+    for (std::size_t s = 0; s < body.samples(); ++s) {
+      EXPECT_GT(body.temperature_k(s), low_k - 0.05) << n;
+      EXPECT_LT(body.temperature_k(s), high_k + 0.05) << n;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace emit::renderer
