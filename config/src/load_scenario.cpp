@@ -365,7 +365,7 @@ Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
   const std::vector<std::string> known = known_band_names(declared);
   scenario.channels = resolve_channels(root, known, diagnostics);
   scenario.bands = bands_in_use(scenario.channels, declared);
-  scenario.atmosphere = resolve_atmosphere(root, scenario.bands, diagnostics);
+  scenario.atmosphere = resolve_atmosphere(root, scenario, diagnostics);
 
   scenario.materials = resolve_materials(pool.members[0].value.items, known, diagnostics);
   // The renderer gets only bands that a channel shows, and emissivities in those bands.

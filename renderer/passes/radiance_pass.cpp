@@ -21,6 +21,7 @@ physics::Result<RadiancePass> RadiancePass::create(const scene::ThermalOptions& 
   std::vector<gl::Define> defines{{"EMIT_BANDS", fmt::format("{}u", content.bands)},
                                   {"EMIT_AIR_TERMS", fmt::format("{}u", content.air_terms)},
                                   {"EMIT_AIR_TABLE", fmt::format("{}u", content.air_table)},
+                                  {"EMIT_AIR_MODEL", fmt::format("{}u", content.air_model)},
                                   {"EMIT_TERMS", fmt::format("{}", content.terms)},
                                   {"EMIT_OUTPUTS", fmt::format("{}u", content.outputs)},
                                   rows_define(pass.rows_)};

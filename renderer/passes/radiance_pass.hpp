@@ -14,6 +14,7 @@ struct RadianceContent {
   std::uint32_t bands = 0;
   std::uint32_t air_terms = 0;  ///< bit per band: its air is a sum of exponential terms
   std::uint32_t air_table = 0;  ///< bit per band: its air is a table
+  std::uint32_t air_model = 0;  ///< bit per band: its air is built in
   std::uint32_t terms = 0;      ///< largest number of exponential terms of a band
   std::uint32_t outputs = 0;    ///< planes behind those of the bands, EMIT_OUTPUT_*
 };

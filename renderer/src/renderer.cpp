@@ -200,6 +200,8 @@ class GlRenderer final : public Renderer {
   gl::Buffer band_buffer_;
   gl::Buffer table_buffer_;
   gl::BufferTexture band_table_;
+  gl::Buffer air_buffer_;  ///< tables of the built-in air for the frame's camera
+  gl::BufferTexture air_table_;
   gl::Buffer output_buffer_;  ///< planes of the output image, then counters
   std::size_t planes_ = 0;
   std::size_t stats_offset_ = 0;  ///< bytes from the start of output_buffer_ to the counters
@@ -216,6 +218,7 @@ RadianceContent radiance_content(const BandModel& bands, const OutputOptions& ou
   return {.bands = static_cast<std::uint32_t>(bands.params().size()),
           .air_terms = bands.air_terms(),
           .air_table = bands.air_table(),
+          .air_model = bands.air_model(),
           .terms = bands.max_terms(),
           .outputs = (output.temperature ? EMIT_OUTPUT_TEMPERATURE : 0U) |
                      (output.depth ? EMIT_OUTPUT_DEPTH : 0U) |
@@ -257,6 +260,8 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
       band_buffer_(gl::Buffer::dynamic(EMIT_MAX_BANDS * sizeof(gpu::BandParams))),
       table_buffer_(gl::Buffer::from(bands_.tables())),
       band_table_(GL_R32F, table_buffer_),
+      air_buffer_(gl::Buffer::dynamic(bands_.air_nodes().size_bytes())),
+      air_table_(GL_RGBA32F, air_buffer_),
       output_buffer_(planes_bytes(scenario, output) + sizeof(gpu::FrameStatsGpu), nullptr, 0),
       planes_(plane_count(scenario, output)),
       stats_offset_(planes_bytes(scenario, output)),
@@ -419,13 +424,16 @@ void GlRenderer::prepare(const FrameRequest& request, const QualityLevel& level)
   const bool sun_up = sun.elevation.value() > StepPlan::kMinSunElevationRad;
   frame_params_.to_sun = glm::vec3(sun.direction_enu);
   frame_params_.sun_up = sun_up ? 1.0F : 0.0F;
-  bands_.update(stage_->forcing_now(), sun);
+  const double sensor_m = scenario_.place.height_m + request.sensor_pose.position_world_m.z;
+  frame_params_.sensor_height_m = static_cast<float>(sensor_m);
+  bands_.update(stage_->forcing_now(), sun, sensor_m);
   upload_frame();
 }
 
 void GlRenderer::upload_frame() noexcept {
   frame_buffer_.upload(std::span<const gpu::FrameParams>(&frame_params_, 1));
   band_buffer_.upload(bands_.params());
+  if (bands_.air_model() != 0) air_buffer_.upload(bands_.air_nodes());
   stage_->upload();
 }
 
@@ -433,6 +441,7 @@ void GlRenderer::bind_frame() const noexcept {
   frame_buffer_.bind_uniform(EMIT_BIND_FRAME);
   band_buffer_.bind_uniform(EMIT_BIND_BANDS);
   band_table_.bind(EMIT_TEX_BAND_LUT);
+  air_table_.bind(EMIT_TEX_AIR);
   output_buffer_.bind_storage(EMIT_BIND_OUTPUT, 0, stats_offset_);
   output_buffer_.bind_storage(EMIT_BIND_STATS, stats_offset_, sizeof(gpu::FrameStatsGpu));
   passes_.geometry.bind_textures();

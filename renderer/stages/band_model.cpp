@@ -58,7 +58,55 @@ double band_emissivity_frac(const scene::Material& material, const std::string& 
   return material.emissivity_frac;
 }
 
+/// Sunlight in a band outside the atmosphere, normal to the sun at 1 au, W m-2: that of the
+/// built-in band, or of a blackbody of the sun's disc.
+double sun_outside_w_m2(const scene::SpectralBand& desc, const physics::Band& band) {
+  if (desc.response.empty()) {
+    if (const auto air = physics::BandAir::find(desc.name)) return air->sun_outside_w_m2();
+  }
+  return physics::band_radiance(band, physics::Kelvin(physics::kSunTemperatureK)).radiance_w_m2_sr *
+         physics::kPi * std::pow(std::sin(physics::kSunSemiAngleRad), 2);
+}
+
 }  // namespace
+
+physics::Result<void> BandModel::build_views(const scene::ScenarioDesc& scenario) {
+  // Bands of one atmosphere share its paths.
+  for (std::size_t first = 0; first < entries_.size(); ++first) {
+    if ((air_model_ >> first & 1U) == 0 || entries_[first].view) continue;
+    const physics::AirSpec spec = *atmosphere_of(scenario, scenario.bands[first].name)->model;
+    const auto column = physics::AirColumn::build(spec);
+    if (!column) {
+      return make_error(ErrorCode::config, fmt::format("band '{}': {}", scenario.bands[first].name,
+                                                       column.error().text));
+    }
+    std::vector<std::size_t> members;
+    std::vector<physics::BandAir> bands;
+    for (std::size_t i = first; i < entries_.size(); ++i) {
+      if ((air_model_ >> i & 1U) == 0) continue;
+      if (*atmosphere_of(scenario, scenario.bands[i].name)->model != spec) continue;
+      auto band = physics::BandAir::find(scenario.bands[i].name);
+      if (!band) {
+        return make_error(ErrorCode::config,
+                          fmt::format("band '{}': it has no built-in air", scenario.bands[i].name));
+      }
+      members.push_back(i);
+      bands.push_back(std::move(*band));
+    }
+    std::vector<physics::AirView::Subject> subjects;
+    for (const physics::BandAir& band : bands) subjects.push_back({&band});
+    std::vector<physics::AirView> views = physics::AirView::build(*column, subjects);
+    for (std::size_t k = 0; k < members.size(); ++k) {
+      Entry& entry = entries_[members[k]];
+      entry.view = std::move(views[k]);
+      entry.climate_k = column->at(place_m_).kelvin;
+      params_[members[k]].air_view_first = static_cast<std::uint32_t>(air_nodes_.size());
+      air_nodes_.resize(air_nodes_.size() + physics::AirView::kNodes);
+    }
+  }
+  if (air_nodes_.empty()) air_nodes_.resize(1);
+  return {};
+}
 
 physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
                                             std::span<const scene::Material> materials) {
@@ -83,7 +131,9 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
     params.vertical_transmittance_frac = 1.0F;
     // Read the atmosphere.
     const scene::BandAtmosphere* atmosphere = atmosphere_of(scenario, desc.name);
-    if (atmosphere != nullptr && !atmosphere->table.empty()) {
+    if (atmosphere != nullptr && atmosphere->model) {
+      model.air_model_ |= 1U << model.params_.size();
+    } else if (atmosphere != nullptr && !atmosphere->table.empty()) {
       auto air = physics::AtmosphereTable::build(atmosphere->table);
       if (!air) {
         return make_error(ErrorCode::config,
@@ -114,15 +164,16 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
           static_cast<float>(atmosphere->vertical_transmittance_frac);
     }
     // Compute the constants of sun and sky.
-    entry.sun_radiance_w_m2_sr =
-        physics::band_radiance(entry.band, physics::Kelvin(physics::kSunTemperatureK))
-            .radiance_w_m2_sr;
+    entry.sun_outside_w_m2 = sun_outside_w_m2(desc, entry.band);
     entry.sky_hemisphere_frac = sky_hemisphere_frac(entry.vertical_transmittance_frac);
     model.nodes_per_band_ = static_cast<std::uint32_t>(lut->nodes().size());
     model.tables_.insert(model.tables_.end(), lut->nodes().begin(), lut->nodes().end());
     model.params_.push_back(params);
     model.entries_.push_back(std::move(entry));
   }
+  model.place_m_ = scenario.place.height_m;
+  model.turbidity_ = scenario.clear_sky.linke_turbidity;
+  if (auto views = model.build_views(scenario); !views) return tl::unexpected(views.error());
   // Append the tables of the air behind those of the bands.
   for (std::size_t i = 0; i < model.entries_.size(); ++i) {
     if (!model.entries_[i].air) continue;
@@ -161,10 +212,17 @@ std::vector<physics::ApparentTemperature> BandModel::apparent_temperatures() con
   return out;
 }
 
-void BandModel::update(const physics::Forcing& forcing, const physics::SunPosition& sun) noexcept {
-  // Compute the projected solid angle of the sun and the air mass on the way to it.
-  const double disc_sr_projected = physics::kPi * std::pow(std::sin(physics::kSunSemiAngleRad), 2);
+void BandModel::update(const physics::Forcing& forcing, const physics::SunPosition& sun,
+                       double sensor_m) noexcept {
+  // The direct sun is weaker than a clear one by what clouds and haze take from the beam.
   const double air_mass = physics::relative_air_mass(sun.elevation);
+  const double beam_frac = air_mass > 0.0
+                               ? (1.0 - forcing.cloud_frac) *
+                                     physics::beam_share_frac(forcing.direct_normal_w_m2, sun,
+                                                              physics::Metres(place_m_), turbidity_)
+                               : 0.0;
+  const double sin_sun = std::sin(sun.elevation.value());
+  const double sin_shown = std::sin(physics::apparent_elevation(sun.elevation).value());
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     const Entry& entry = entries_[i];
     gpu::BandParams& params = params_[i];
@@ -175,18 +233,25 @@ void BandModel::update(const physics::Forcing& forcing, const physics::SunPositi
     params.surroundings_radiance_w_m2_sr = static_cast<float>(
         physics::band_radiance(entry.band, physics::Kelvin(forcing.environment_k))
             .radiance_w_m2_sr);
-    params.sky_hemisphere_w_m2_sr = static_cast<float>(
-        entry.air ? entry.air_hemisphere_w_m2_sr : air_w_m2_sr * entry.sky_hemisphere_frac);
-    // Compute the irradiance of the sun. Without direct sun in the forcing (overcast) it is 0.
-    const bool sun_shines =
-        forcing.direct_normal_w_m2 * (1.0 - forcing.cloud_frac) > 0.0 && air_mass > 0.0;
-    const double sun_transmittance_frac =
-        entry.air ? entry.air->out(std::sin(sun.elevation.value())).transmittance_frac
-                  : std::pow(entry.vertical_transmittance_frac, air_mass);
+    double sky_w_m2_sr = air_w_m2_sr * entry.sky_hemisphere_frac;
+    double sun_transmittance_frac = std::pow(entry.vertical_transmittance_frac, air_mass);
+    if (entry.view) {
+      // The place's air differs from that of the climate, and the difference fades upwards.
+      const double warmer_k =
+          (forcing.air_k - entry.climate_k) * std::exp(place_m_ / physics::BandAir::kWarmthScaleM);
+      entry.view->at(
+          sensor_m, warmer_k,
+          std::span(air_nodes_).subspan(params.air_view_first, physics::AirView::kNodes));
+      sky_w_m2_sr = entry.view->sky_mean_w_m2_sr(place_m_, warmer_k);
+      sun_transmittance_frac = entry.view->sun_transmittance_frac(place_m_, sin_shown);
+    } else if (entry.air) {
+      sky_w_m2_sr = entry.air_hemisphere_w_m2_sr;
+      sun_transmittance_frac = entry.air->out(sin_sun).transmittance_frac;
+    }
+    params.sky_hemisphere_w_m2_sr = static_cast<float>(sky_w_m2_sr);
     params.sun_irradiance_w_m2 =
-        sun_shines ? static_cast<float>(entry.sun_radiance_w_m2_sr * disc_sr_projected *
-                                        (1.0 - forcing.cloud_frac) * sun_transmittance_frac)
-                   : 0.0F;
+        static_cast<float>(entry.sun_outside_w_m2 / (sun.distance_au * sun.distance_au) *
+                           beam_frac * sun_transmittance_frac);
   }
 }
 

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "emit/physics/air_view.hpp"
 #include "emit/physics/apparent_temperature.hpp"
 #include "emit/physics/atmosphere_table.hpp"
 #include "emit/physics/error.hpp"
@@ -24,8 +25,10 @@ class BandModel {
   [[nodiscard]] static physics::Result<BandModel> build(const scene::ScenarioDesc& scenario,
                                                         std::span<const scene::Material> materials);
 
-  /// Sets air, surroundings and sun to the instant of the frame.
-  void update(const physics::Forcing& forcing, const physics::SunPosition& sun) noexcept;
+  /// Sets air, surroundings and sun to the instant of the frame. `sensor_m` is the height of the
+  /// camera above sea level.
+  void update(const physics::Forcing& forcing, const physics::SunPosition& sun,
+              double sensor_m) noexcept;
 
   /// Parameters by band, as the shaders read them.
   [[nodiscard]] std::span<const gpu::BandParams> params() const noexcept { return params_; }
@@ -36,6 +39,13 @@ class BandModel {
   [[nodiscard]] std::uint32_t nodes_per_band() const noexcept { return nodes_per_band_; }
   /// Bits of the bands whose air is a sum of exponential terms.
   [[nodiscard]] std::uint32_t air_terms() const noexcept { return air_terms_; }
+  /// Bits of the bands with built-in air.
+  [[nodiscard]] std::uint32_t air_model() const noexcept { return air_model_; }
+  /// Tables of the built-in air for the camera of the frame, one behind the other
+  /// (lib/air_view.glsl). One node without built-in air.
+  [[nodiscard]] std::span<const physics::AirView::Node> air_nodes() const noexcept {
+    return air_nodes_;
+  }
   /// Bits of the bands whose air is a table.
   [[nodiscard]] std::uint32_t air_table() const noexcept { return air_table_; }
   /// Largest number of exponential terms of a band.
@@ -49,17 +59,25 @@ class BandModel {
   /// Constants of one band.
   struct Entry {
     physics::Band band;
-    double sun_radiance_w_m2_sr = 0.0;  ///< band radiance of the photosphere
     /// Mean radiance of the sky over the hemisphere divided by a blackbody at air temperature.
     double sky_hemisphere_frac = 0.0;
     double vertical_transmittance_frac = 1.0;
     std::optional<physics::AtmosphereTable> air = std::nullopt;  ///< replaces the terms
     double air_hemisphere_w_m2_sr = 0.0;                         ///< mean radiance of that sky
+    std::optional<physics::AirView> view = std::nullopt;         ///< built-in air
+    double climate_k = 0.0;       ///< air temperature of the climate at the ground of the place
+    double sun_outside_w_m2 = 0;  ///< in band, normal to the sun, at 1 au
   };
+  /// Makes the views of the bands with built-in air.
+  [[nodiscard]] physics::Result<void> build_views(const scene::ScenarioDesc& scenario);
   std::vector<Entry> entries_;
   std::vector<gpu::BandParams> params_;
   std::vector<float> tables_;
   std::uint32_t nodes_per_band_ = 0;
+  std::vector<physics::AirView::Node> air_nodes_;
+  double place_m_ = 0.0;  ///< height of the world's origin above sea level
+  double turbidity_ = 0.0;
+  std::uint32_t air_model_ = 0;
   std::uint32_t air_terms_ = 0;
   std::uint32_t air_table_ = 0;
   std::uint32_t max_terms_ = 0;

@@ -63,7 +63,9 @@ struct WeatherDraft {
 };
 struct AtmosphereDraft {
   bool enabled = true;
-  std::string model = "midlatitude_summer";
+  std::string model = "auto";
+  double visibility_km = 23.0;
+  std::optional<double> water_ratio;
   std::filesystem::path file;
   std::vector<scene::BandAtmosphere> bands;
 };

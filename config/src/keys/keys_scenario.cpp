@@ -317,15 +317,22 @@ const KeyTable<AtmosphereDraft>& atmosphere_keys() {
       choice<AtmosphereDraft>(
           "model",
           std::vector<std::pair<std::string, std::string>>{
-              {"midlatitude_summer", "midlatitude_summer"},
-              {"midlatitude_summer_hazy", "midlatitude_summer_hazy"},
-              {"midlatitude_winter", "midlatitude_winter"},
+              {"auto", "auto"},
               {"tropical", "tropical"},
+              {"midlatitude_summer", "midlatitude_summer"},
+              {"midlatitude_winter", "midlatitude_winter"},
+              {"subarctic_summer", "subarctic_summer"},
+              {"subarctic_winter", "subarctic_winter"},
               {"us_standard", "us_standard"},
               {"none", "none"}},
           EMIT_FIELD(model),
-          "Terms of the built-in bands: fits to LOWTRAN7 with rural haze and 23 km visibility "
-          "(`hazy`: 5 km). With `none` only `file` and `[[atmosphere.band]]` count."),
+          "Climate of the built-in bands' air (see Built-in air). With `none` only `file` and "
+          "`[[atmosphere.band]]` count."),
+      number<AtmosphereDraft>("visibility_km", "km", between(2, 50), EMIT_FIELD(visibility_km),
+                              "Visibility in the haze of the built-in air."),
+      number<AtmosphereDraft>("water_ratio", "", between(0, 5), EMIT_FIELD(water_ratio),
+                              "Water vapour of the built-in air, by that of its climate. Without "
+                              "it: see Built-in air."),
       path<AtmosphereDraft>("file", EMIT_FIELD(file),
                             "CSV file of the air (see Atmosphere tables). It comes before the "
                             "model. Bands that a grid lacks need `model` written out."),

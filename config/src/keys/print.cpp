@@ -121,7 +121,16 @@ std::string print_scenario(const scene::ScenarioDesc& scenario) {
   AtmosphereDraft atmosphere;
   atmosphere.enabled = scenario.atmosphere.enabled;
   atmosphere.model = "none";
-  atmosphere.bands = scenario.atmosphere.bands;
+  // Bands with built-in air share its description; the others are written out.
+  for (const scene::BandAtmosphere& band : scenario.atmosphere.bands) {
+    if (!band.model) {
+      atmosphere.bands.push_back(band);
+      continue;
+    }
+    atmosphere.model = physics::air_climate_name(band.model->climate);
+    atmosphere.visibility_km = band.model->visibility_km;
+    atmosphere.water_ratio = band.model->water_ratio;
+  }
   print_section("[atmosphere]", atmosphere, atmosphere_keys(), out);
 
   print_section("[thermal]", scenario.thermal, thermal_keys(), out);

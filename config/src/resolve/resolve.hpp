@@ -36,11 +36,14 @@ void check_channels(const Node& root, const scene::ScenarioDesc& scenario, bool 
 [[nodiscard]] std::vector<scene::SpectralBand> bands_in_use(
     const std::vector<scene::ChannelDesc>& channels,
     const std::vector<scene::SpectralBand>& declared);
-[[nodiscard]] scene::AtmosphereDesc resolve_atmosphere(
-    const Node& root, const std::vector<scene::SpectralBand>& bands, Diagnostics& diagnostics);
-/// Terms of a built-in model for a built-in band. Empty: there is no such model or band.
-[[nodiscard]] std::optional<scene::BandAtmosphere> model_atmosphere(const std::string& model,
-                                                                    const std::string& band);
+/// The air of the bands of `scenario`. Place, date and weather of the scenario are those of the
+/// built-in air.
+[[nodiscard]] scene::AtmosphereDesc resolve_atmosphere(const Node& root,
+                                                       const scene::ScenarioDesc& scenario,
+                                                       Diagnostics& diagnostics);
+/// Built-in air of a scenario. `model` is a climate or "auto"; nothing for "none".
+[[nodiscard]] std::optional<physics::AirSpec> built_in_air(const AtmosphereDraft& draft,
+                                                           const scene::ScenarioDesc& scenario);
 
 /// Reports a name that no material has, with the nearest one.
 void check_material_name(const std::string& name, const std::vector<scene::Material>& materials,

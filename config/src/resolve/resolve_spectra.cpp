@@ -355,8 +355,9 @@ void check_inline_atmosphere(const Node& node, const BandAtmosphere& entry,
 
 }  // namespace
 
-scene::AtmosphereDesc resolve_atmosphere(const Node& root, const std::vector<SpectralBand>& bands,
+scene::AtmosphereDesc resolve_atmosphere(const Node& root, const scene::ScenarioDesc& scenario,
                                          Diagnostics& diagnostics) {
+  const std::vector<SpectralBand>& bands = scenario.bands;
   const Node& table = section(root, "atmosphere", diagnostics);
   AtmosphereDraft draft;
   const bool bands_are_sound = diagnostics.empty();
@@ -394,6 +395,7 @@ scene::AtmosphereDesc resolve_atmosphere(const Node& root, const std::vector<Spe
   if (diagnostics.size() != faults) {
     return out;
   }
+  const std::optional<physics::AirSpec> built_in = built_in_air(draft, scenario);
   for (const SpectralBand& band : bands) {
     const auto named = [&band](const BandAtmosphere& entry) { return entry.band == band.name; };
     const auto inline_entry = std::find_if(draft.bands.begin(), draft.bands.end(), named);
@@ -408,8 +410,11 @@ scene::AtmosphereDesc resolve_atmosphere(const Node& root, const std::vector<Spe
                       fmt::format("'file': {} has no rows of band '{}': add them, or name the "
                                   "'model' that stands in for it",
                                   draft.file.string(), band.name));
-    } else if (std::optional<BandAtmosphere> model = model_atmosphere(draft.model, band.name)) {
-      out.bands.push_back(std::move(*model));
+    } else if (built_in && physics::BandAir::find(band.name)) {
+      BandAtmosphere entry;
+      entry.band = band.name;
+      entry.model = built_in;
+      out.bands.push_back(std::move(entry));
     } else if (draft.enabled && bands_are_sound) {
       diagnostics.add(
           band_location(root, band.name, table),

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 
 #include "air_tables.hpp"
@@ -71,6 +72,10 @@ std::size_t layer_of(double height_m) noexcept {
       std::upper_bound(kLayersKm.begin(), kLayersKm.end(), height_m * 1e-3) - kLayersKm.begin());
 }
 
+constexpr std::array<std::string_view, 6> kClimateNames{"tropical",           "midlatitude_summer",
+                                                        "midlatitude_winter", "subarctic_summer",
+                                                        "subarctic_winter",   "us_standard"};
+
 constexpr double kEmissionFirstK = 150.0;
 constexpr double kEmissionStepK = 2.0;
 constexpr std::size_t kEmissionNodes = 111;  // up to 370 K
@@ -78,12 +83,26 @@ constexpr std::size_t kEmissionNodes = 111;  // up to 370 K
 }  // namespace
 
 std::optional<AirClimate> air_climate(std::string_view name) noexcept {
-  constexpr std::array<std::string_view, 6> kNames{"tropical",           "midlatitude_summer",
-                                                   "midlatitude_winter", "subarctic_summer",
-                                                   "subarctic_winter",   "us_standard"};
-  const auto found = std::find(kNames.begin(), kNames.end(), name);
-  if (found == kNames.end()) return std::nullopt;
-  return static_cast<AirClimate>(found - kNames.begin());
+  const auto found = std::find(kClimateNames.begin(), kClimateNames.end(), name);
+  if (found == kClimateNames.end()) return std::nullopt;
+  return static_cast<AirClimate>(found - kClimateNames.begin());
+}
+
+std::string_view air_climate_name(AirClimate climate) noexcept {
+  return kClimateNames[static_cast<std::size_t>(climate)];
+}
+
+AirClimate air_climate_of(double lat_rad, std::int64_t posix_utc_ns) noexcept {
+  const double lat_deg = lat_rad / kDegree;
+  if (std::abs(lat_deg) < 23.5) return AirClimate::tropical;
+  const std::chrono::sys_days day = std::chrono::floor<std::chrono::days>(
+      std::chrono::sys_time<std::chrono::nanoseconds>(std::chrono::nanoseconds(posix_utc_ns)));
+  const unsigned month = static_cast<unsigned>(std::chrono::year_month_day(day).month());
+  const bool summer = (month >= 4 && month <= 9) == (lat_deg > 0.0);
+  if (std::abs(lat_deg) < 55.0) {
+    return summer ? AirClimate::midlatitude_summer : AirClimate::midlatitude_winter;
+  }
+  return summer ? AirClimate::subarctic_summer : AirClimate::subarctic_winter;
 }
 
 double saturated_vapour_g_m3(double kelvin) noexcept {

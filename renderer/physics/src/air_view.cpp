@@ -53,6 +53,30 @@ ViewCell view_cell(float place, std::size_t nodes) noexcept {
   return {index, held - static_cast<float>(index)};
 }
 
+/// Cell of the sky's axis for a sine of the elevation.
+ViewCell elevation_cell(float sin_elevation) noexcept {
+  static const float kFirst = static_cast<float>(kFirstElevation);
+  static const float kPerNode =
+      static_cast<float>((AirView::kElevations - 1) / (kLastElevation - kFirstElevation));
+  const float x = sin_elevation / static_cast<float>(AirView::kElevationScale);
+  // asinh() of a negative argument would cancel.
+  const float root = std::log(std::abs(x) + std::sqrt(x * x + 1.0F));
+  return view_cell(((x < 0.0F ? -root : root) - kFirst) * kPerNode, AirView::kElevations);
+}
+
+/// Shares of the sky's nodes in a cosine-weighted mean over the upper hemisphere, by the midpoint
+/// rule in the square of the sine.
+std::array<float, AirView::kElevations> sky_shares() {
+  constexpr int kRings = 4096;
+  std::array<float, AirView::kElevations> shares{};
+  for (int i = 0; i < kRings; ++i) {
+    const ViewCell cell = elevation_cell(static_cast<float>(std::sqrt((i + 0.5) / kRings)));
+    shares[cell.index] += (1.0F - cell.fraction) / kRings;
+    shares[cell.index + 1] += cell.fraction / kRings;
+  }
+  return shares;
+}
+
 AirView::Node mix_nodes(const AirView::Node& a, const AirView::Node& b, float f) noexcept {
   AirView::Node out;
   for (std::size_t k = 0; k < out.size(); ++k) out[k] = a[k] + f * (b[k] - a[k]);
@@ -102,25 +126,64 @@ std::vector<AirView> AirView::build(const AirColumn& column, std::span<const Sub
   return views;
 }
 
-void AirView::at(double sensor_m, double warmer_k, std::span<Node> out) const noexcept {
-  EMIT_DCHECK(out.size() == kNodes);
+struct AirView::Place {
+  const Slice* low;
+  const Slice* high;
+  float fraction;
+  std::array<float, 3> share;
+};
+
+AirView::Place AirView::place_of(double sensor_m, double warmer_k) const noexcept {
   const ViewCell sensor = view_cell(height_place(static_cast<float>(sensor_m)), kHeights);
   // Interpolate the logarithm of the radiance with the parabola through the three temperatures.
   const float x = static_cast<float>(std::clamp(warmer_k / kMostWarmerK, -1.0, 1.0));
-  const std::array<float, 3> share{0.5F * x * (x - 1.0F), 1.0F - x * x, 0.5F * x * (x + 1.0F)};
   const Slice* low = &slices_[sensor.index * kNodes];
-  const Slice* high = low + kNodes;
+  return {low,
+          low + kNodes,
+          sensor.fraction,
+          {0.5F * x * (x - 1.0F), 1.0F - x * x, 0.5F * x * (x + 1.0F)}};
+}
+
+float AirView::radiance_at(const Place& place, std::size_t node) noexcept {
+  const auto logarithm = [&place](const Slice& slice) {
+    return place.share[0] * slice.log_radiance[0] + place.share[1] * slice.log_radiance[1] +
+           place.share[2] * slice.log_radiance[2];
+  };
+  const float low = logarithm(place.low[node]);
+  return std::exp(low + place.fraction * (logarithm(place.high[node]) - low));
+}
+
+void AirView::at(double sensor_m, double warmer_k, std::span<Node> out) const noexcept {
+  EMIT_DCHECK(out.size() == kNodes);
+  const Place place = place_of(sensor_m, warmer_k);
   for (std::size_t i = 0; i < kNodes; ++i) {
-    const auto log_radiance = [&share](const Slice& slice) {
-      return share[0] * slice.log_radiance[0] + share[1] * slice.log_radiance[1] +
-             share[2] * slice.log_radiance[2];
-    };
-    const float a = log_radiance(low[i]);
     for (std::size_t k = 0; k < 3; ++k) {
-      out[i][k] = low[i].air[k] + sensor.fraction * (high[i].air[k] - low[i].air[k]);
+      const float low = place.low[i].air[k];
+      out[i][k] = low + place.fraction * (place.high[i].air[k] - low);
     }
-    out[i][3] = std::exp(a + sensor.fraction * (log_radiance(high[i]) - a));
+    out[i][3] = radiance_at(place, i);
   }
+}
+
+double AirView::sky_mean_w_m2_sr(double height_m, double warmer_k) const noexcept {
+  static const std::array<float, kElevations> kShare = sky_shares();
+  const Place place = place_of(height_m, warmer_k);
+  double sum = 0.0;
+  for (std::size_t e = 0; e < kElevations; ++e) {
+    if (kShare[e] > 0.0F) sum += kShare[e] * radiance_at(place, kHeights * kRanges + e);
+  }
+  return sum;
+}
+
+double AirView::sun_transmittance_frac(double height_m, double sin_elevation) const noexcept {
+  const Place place = place_of(height_m, 0.0);
+  const ViewCell cell = elevation_cell(static_cast<float>(sin_elevation));
+  const auto depth = [&](std::size_t e) {
+    const std::size_t i = kHeights * kRanges + e;
+    return place.low[i].air[2] + place.fraction * (place.high[i].air[2] - place.low[i].air[2]);
+  };
+  const float low = depth(cell.index);
+  return std::exp(-(low + cell.fraction * (depth(cell.index + 1) - low)));
 }
 
 AirSight air_sight(std::span<const AirView::Node> table, float target_m, float range_m) noexcept {
@@ -144,14 +207,7 @@ AirSight air_sight(std::span<const AirView::Node> table, float target_m, float r
 }
 
 AirSight air_sky(std::span<const AirView::Node> table, float sin_elevation) noexcept {
-  static const float kFirst = static_cast<float>(kFirstElevation);
-  static const float kPerNode =
-      static_cast<float>((AirView::kElevations - 1) / (kLastElevation - kFirstElevation));
-  const float x = sin_elevation / static_cast<float>(AirView::kElevationScale);
-  // asinh() of a negative argument would cancel.
-  const float root = std::log(std::abs(x) + std::sqrt(x * x + 1.0F));
-  const ViewCell place =
-      view_cell(((x < 0.0F ? -root : root) - kFirst) * kPerNode, AirView::kElevations);
+  const ViewCell place = elevation_cell(sin_elevation);
   const std::size_t i = AirView::kHeights * AirView::kRanges + place.index;
   const AirView::Node node = mix_nodes(table[i], table[i + 1], place.fraction);
   AirSight out;

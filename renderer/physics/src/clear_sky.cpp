@@ -60,6 +60,19 @@ SolarIrradiance clear_sky_irradiance(const SunPosition& sun, Metres height,
   return result;
 }
 
+double beam_share_frac(double direct_normal_w_m2, const SunPosition& sun, Metres height,
+                       double linke_turbidity) noexcept {
+  const double clear = clear_sky_irradiance(sun, height, linke_turbidity).direct_normal_w_m2;
+  return clear < 1.0 ? 0.0 : std::clamp(direct_normal_w_m2 / clear, 0.0, 1.2);
+}
+
+Radians apparent_elevation(Radians airless) noexcept {
+  const double degree = airless.value() / kDegree;
+  if (!(degree > -1.0)) return airless;
+  const double minutes = 1.02 / std::tan((degree + 10.3 / (degree + 5.11)) * kDegree);
+  return Radians((degree + minutes / 60.0) * kDegree);
+}
+
 double sky_emissivity_frac(Kelvin dew_point, double cloud_frac) noexcept {
   const double x = (dew_point.value() - kZeroCelsiusK) / 100.0;
   const double clear = std::min(1.0, 0.758 + x * (0.521 + x * 0.625));

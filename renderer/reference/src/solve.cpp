@@ -362,6 +362,15 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
                                 std::span<const glm::dvec3> sky_rays, SolvedImage& image) {
   const ClimateNode now = climate->at(view.sim_time_ns);
   const glm::dvec3 to_sun = glm::normalize(now.to_sun);
+  const physics::GeoPlace place{physics::Radians(scenario.place.lat_rad),
+                                physics::Radians(scenario.place.lon_rad),
+                                physics::Metres(scenario.place.height_m)};
+  const physics::SunPosition sun =
+      physics::sun_position(scenario.epoch_utc_ns + view.sim_time_ns, place);
+  const double beam_frac = (1.0 - cloud_frac_at(scenario, view.sim_time_ns)) *
+                           physics::beam_share_frac(now.direct_normal_w_m2, sun, place.height,
+                                                    scenario.clear_sky.linke_turbidity);
+  const double sensor_m = view.sensor_pose.position_world_m.z;
   std::vector<double> face_k;
   if (solid) {
     face_k.resize(solid->solver().faces().size());
@@ -369,8 +378,7 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
   }
   for (std::size_t b = 0; b < bands.size(); ++b) {
     BandRadiance& band = bands[b];
-    band.set_air(now.air_k, to_sun.z, cloud_frac_at(scenario, view.sim_time_ns),
-                 now.direct_normal_w_m2 > 0.0);
+    band.set_air(now.air_k, sun, beam_frac);
     // Compute the radiance that every patch sends out.
     const double around = band.black(now.surroundings_k);
     std::vector<double> patch;
@@ -398,9 +406,9 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
       const PixelHit& hit = hits[i];
       const double e = band.emissivity(geometry.materials[hit.point.material]);
       // Sum what arrives at the surface: sky, surroundings, sun and patches.
-      double incoming = hit.sky_frac * band.sky_mean() + hit.ground_frac * around +
-                        band.sun_w_m2() / physics::kPi * hit.sun_frac *
-                            std::max(0.0, glm::dot(hit.point.normal, to_sun));
+      double incoming = hit.sky_frac * band.sky_mean() + hit.ground_frac * around;
+      const double sunlight = band.sun_w_m2() / physics::kPi * hit.sun_frac *
+                              std::max(0.0, glm::dot(hit.point.normal, to_sun));
       if (solid) {
         for (const SceneExchange::Link& link : solid->radiation().links(hit.face)) {
           incoming += static_cast<double>(link.share_frac) * patch[link.patch];
@@ -411,14 +419,15 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
         }
       }
       // Add emission and reflection, then pass the air to the camera.
-      const double leaving = e * band.black(kelvin[i]) + (1.0 - e) * incoming;
+      const BandRadiance::Leaving leaving{e * band.black(kelvin[i]) + (1.0 - e) * incoming,
+                                          (1.0 - e) * sunlight, kelvin[i]};
       plane[hit.pixel] =
-          static_cast<float>(band.at_aperture(leaving, hit.range_m, hit.direction.z));
+          static_cast<float>(band.at_aperture(leaving, sensor_m, hit.range_m, hit.direction.z));
     });
     // Fill the pixels of the sky.
     for (std::size_t p = 0; p < sky_rays.size(); ++p) {
       if (sky_rays[p] == glm::dvec3(0.0)) continue;
-      plane[p] = static_cast<float>(band.sky(sky_rays[p].z));
+      plane[p] = static_cast<float>(band.sky(sensor_m, sky_rays[p].z));
     }
   }
 }

@@ -72,7 +72,17 @@ physics::Result<BandRadiance> BandRadiance::create(const scene::ScenarioDesc& sc
   if (scenario.atmosphere.enabled) {
     for (const scene::BandAtmosphere& entry : scenario.atmosphere.bands) {
       if (entry.band != out.name_) continue;
-      if (entry.table.empty()) {
+      if (entry.model) {
+        auto column = physics::AirColumn::build(*entry.model);
+        out.air_terms_ = physics::BandAir::find(out.name_);
+        if (!column || !out.air_terms_) {
+          return physics::make_error(
+              physics::ErrorCode::config,
+              fmt::format("band '{}': {}", out.name_,
+                          column ? "it has no built-in air" : column.error().text));
+        }
+        out.column_ = std::move(*column);
+      } else if (entry.table.empty()) {
         out.terms_ = entry.terms;
         out.vertical_frac_ = entry.vertical_transmittance_frac;
       } else {
@@ -93,19 +103,42 @@ physics::Result<BandRadiance> BandRadiance::create(const scene::ScenarioDesc& sc
     out.sky_share_ += (1.0 - std::pow(out.vertical_frac_, air_mass(std::sin(elevation)))) *
                       std::sin(2.0 * elevation) * physics::kPi / 2.0 / kRings;
   }
-  out.sun_black_ = out.black(physics::kSunTemperatureK);
+  out.place_m_ = scenario.place.height_m;
+  const auto built_in = scenario.bands[band].response.empty() ? physics::BandAir::find(out.name_)
+                                                              : std::optional<physics::BandAir>();
+  out.sun_outside_w_m2_ = built_in ? built_in->sun_outside_w_m2()
+                                   : out.black(physics::kSunTemperatureK) * physics::kPi *
+                                         std::pow(std::sin(physics::kSunSemiAngleRad), 2);
   return out;
 }
 
-void BandRadiance::set_air(double air_k, double sin_sun, double cloud_frac, bool sun_shines) {
+void BandRadiance::set_air(double air_k, const physics::SunPosition& sun, double beam_frac) {
   // The sky radiates like air of the opacity along its direction.
   air_ = black(air_k);
-  sky_mean_ = table_ ? table_->sky_hemisphere_w_m2_sr() : air_ * sky_share_;
-  // The sun is a disc of a blackbody behind clouds and air.
-  const double disc_sr = physics::kPi * std::pow(std::sin(physics::kSunSemiAngleRad), 2);
-  const double through = table_ ? table_->out(sin_sun).transmittance_frac
-                                : std::pow(vertical_frac_, air_mass(sin_sun));
-  sun_w_m2_ = sun_shines ? sun_black_ * disc_sr * (1.0 - cloud_frac) * through : 0.0;
+  const double sin_sun = std::sin(sun.elevation.value());
+  double through = 0.0;
+  if (column_) {
+    warmer_k_ = (air_k - column_->at(place_m_).kelvin) *
+                std::exp(place_m_ / physics::BandAir::kWarmthScaleM);
+    // Average the sky by the midpoint rule over the elevation, weight 2 sin cos.
+    constexpr int kRings = 400;
+    sky_mean_ = 0.0;
+    for (int i = 0; i < kRings; ++i) {
+      const double elevation = (i + 0.5) / kRings * physics::kPi / 2.0;
+      sky_mean_ +=
+          sky(0.0, std::sin(elevation)) * std::sin(2.0 * elevation) * physics::kPi / 2.0 / kRings;
+    }
+    const double shown_rad = physics::apparent_elevation(sun.elevation).value();
+    through = shown_rad > 0.0 ? air_terms_->transmittance(
+                                    physics::AirPath::to_space(*column_, place_m_, shown_rad),
+                                    physics::AirSource::sun_lowtran)
+                              : 0.0;
+  } else {
+    sky_mean_ = table_ ? table_->sky_hemisphere_w_m2_sr() : air_ * sky_share_;
+    through = table_ ? table_->out(sin_sun).transmittance_frac
+                     : std::pow(vertical_frac_, air_mass(sin_sun));
+  }
+  sun_w_m2_ = sun_outside_w_m2_ / (sun.distance_au * sun.distance_au) * beam_frac * through;
 }
 
 double BandRadiance::emissivity(const scene::Material& material) const {
@@ -115,20 +148,51 @@ double BandRadiance::emissivity(const scene::Material& material) const {
   return material.emissivity_frac;
 }
 
-double BandRadiance::at_aperture(double leaving, double range_m, double sin_elevation) const {
+double BandRadiance::at_aperture(const Leaving& leaving, double sensor_m, double range_m,
+                                 double sin_elevation) const {
+  if (column_) {
+    const double height_m = place_m_ + sensor_m;
+    const auto path =
+        physics::AirPath::between(*column_, height_m, height_m + range_m * sin_elevation, range_m);
+    const auto seen =
+        air_terms_->evaluate<3, 1>(path,
+                                   {physics::AirSource::black_300k, physics::AirSource::black_800k,
+                                    physics::AirSource::sun_lowtran},
+                                   {warmer_k_});
+    const auto& tau = seen.transmittance_frac;
+    // The spectrum of a surface lies between those of 300 K, 800 K and the sun by its inverse
+    // temperature.
+    const auto log_depth = [](double t) {
+      return std::log(-std::log(std::clamp(t, 1e-30, 1.0 - 1e-12)));
+    };
+    const double inverse = 1.0 / std::max(leaving.surface_k, 200.0);
+    const double warm = (1.0 / 300.0 - inverse) / (1.0 / 300.0 - 1.0 / 800.0);
+    const double hot = (1.0 / 800.0 - inverse) / (1.0 / 800.0 - 1.0 / physics::kSunTemperatureK);
+    const double depth = hot > 0.0
+                             ? std::lerp(log_depth(tau[1]), log_depth(tau[2]), std::min(hot, 1.0))
+                             : std::lerp(log_depth(tau[0]), log_depth(tau[1]), warm);
+    const double thermal = std::exp(-std::exp(depth));
+    return thermal * leaving.thermal + tau[2] * leaving.sunlight + seen.path_radiance_w_m2_sr[0];
+  }
+  const double sum = leaving.thermal + leaving.sunlight;
   if (table_) {
     const auto air = table_->along(range_m, sin_elevation);
-    return air.transmittance_frac * leaving + air.path_radiance_w_m2_sr;
+    return air.transmittance_frac * sum + air.path_radiance_w_m2_sr;
   }
   // Sum the transmittance of the terms; the air radiates with the rest.
   double tau = terms_.empty() ? 1.0 : 0.0;
   for (const scene::AtmosphereTerm& term : terms_) {
     tau += term.amplitude_frac * std::exp(-term.extinction_per_km * range_m * 1e-3);
   }
-  return tau * leaving + (1.0 - tau) * air_;
+  return tau * sum + (1.0 - tau) * air_;
 }
 
-double BandRadiance::sky(double sin_elevation) const {
+double BandRadiance::sky(double sensor_m, double sin_elevation) const {
+  if (column_) {
+    const auto path = physics::AirPath::to_space(*column_, place_m_ + sensor_m,
+                                                 std::asin(std::clamp(sin_elevation, -1.0, 1.0)));
+    return air_terms_->path_radiance_w_m2_sr(path, warmer_k_);
+  }
   if (table_) return table_->out(sin_elevation).path_radiance_w_m2_sr;
   return air_ * (1.0 - std::pow(vertical_frac_, air_mass(sin_elevation)));
 }

@@ -3,8 +3,10 @@
 #include <optional>
 #include <vector>
 
+#include "emit/physics/air_model.hpp"
 #include "emit/physics/atmosphere_table.hpp"
 #include "emit/physics/error.hpp"
+#include "emit/physics/sun.hpp"
 #include "emit/scene/scene_desc.hpp"
 
 namespace emit::reference {
@@ -34,9 +36,8 @@ class BandRadiance {
   [[nodiscard]] static physics::Result<BandRadiance> create(const scene::ScenarioDesc& scenario,
                                                             std::size_t band);
 
-  /// Sets the air temperature, the sine of the sun's elevation and the share of the direct sun that
-  /// clouds take.
-  void set_air(double air_k, double sin_sun, double cloud_frac, bool sun_shines);
+  /// Sets the air temperature, the sun and the share of a clear sky's direct sun that shines.
+  void set_air(double air_k, const physics::SunPosition& sun, double beam_frac);
   /// Returns the in-band radiance of a blackbody, W m-2 sr-1.
   [[nodiscard]] double black(double kelvin) const { return integral_.radiance_w_m2_sr(kelvin); }
   /// Returns the emissivity of a material in this band.
@@ -45,11 +46,19 @@ class BandRadiance {
   [[nodiscard]] double sky_mean() const noexcept { return sky_mean_; }
   /// Irradiance of the sun in the band, across its direction, W m-2.
   [[nodiscard]] double sun_w_m2() const noexcept { return sun_w_m2_; }
-  /// Returns the radiance `leaving` as seen through `range_m` of air, along a line of sight with
-  /// this sine of the elevation.
-  [[nodiscard]] double at_aperture(double leaving, double range_m, double sin_elevation) const;
-  /// Returns the radiance of the sky at a sine of the elevation, W m-2 sr-1.
-  [[nodiscard]] double sky(double sin_elevation) const;
+  /// Radiance that leaves a surface, W m-2 sr-1.
+  struct Leaving {
+    double thermal = 0.0;   ///< emission, and what sky and surroundings send
+    double sunlight = 0.0;  ///< reflected
+    double surface_k = 0.0;
+  };
+  /// Returns the radiance of a surface as seen through `range_m` of air, along a line of sight with
+  /// this sine of the elevation from a height above the world's origin.
+  [[nodiscard]] double at_aperture(const Leaving& leaving, double sensor_m, double range_m,
+                                   double sin_elevation) const;
+  /// Returns the radiance of the sky at a sine of the elevation, W m-2 sr-1, from a height above
+  /// the world's origin.
+  [[nodiscard]] double sky(double sensor_m, double sin_elevation) const;
 
  private:
   explicit BandRadiance(const scene::SpectralBand& band) : integral_(band), name_(band.name) {}
@@ -58,11 +67,15 @@ class BandRadiance {
   std::vector<scene::AtmosphereTerm> terms_;
   double vertical_frac_ = 1.0;
   std::optional<physics::AtmosphereTable> table_;
+  std::optional<physics::AirColumn> column_;  ///< built-in air, with air_terms_
+  std::optional<physics::BandAir> air_terms_;
+  double place_m_ = 0.0;    ///< height of the world's origin above sea level
+  double warmer_k_ = 0.0;   ///< air at sea level against that of the climate
   double sky_share_ = 0.0;  ///< cosine-weighted mean of 1 - tau^m
   double air_ = 0.0;
   double sky_mean_ = 0.0;
   double sun_w_m2_ = 0.0;
-  double sun_black_ = 0.0;
+  double sun_outside_w_m2_ = 0.0;  ///< at 1 au
 };
 
 }  // namespace emit::reference

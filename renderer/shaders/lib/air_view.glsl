@@ -23,19 +23,42 @@ vec2 air_view_cell(float place, int nodes) {
   return vec2(index, held - index);
 }
 
-// Node of a line of sight of `range_m` to a target at a height above sea level: x, y, z = logarithm of the mean
-// extinction in m-1 for surfaces near 300 K, hot ones and reflected sunlight; w = path radiance by 1 - tau of the
-// first.
-vec4 air_view_sight(int first, float target_m, float range_m) {
+// Place of a line of sight in a table: its cell and the position in it. The sky has one row.
+struct AirPlace {
+  int low;       // index of the cell's first node, from the start of the table
+  int row;       // distance to the node of the next height; 0 in the sky
+  float along;   // position between two ranges or elevations, 0..1
+  float across;  // position between two heights
+};
+
+// Place of a line of sight of `range_m` to a target at a height above sea level.
+AirPlace air_view_sight_place(float target_m, float range_m) {
   float km = target_m * 1e-3;
   float place = 4.0 * clamp(km, 0.0, 2.0) + 2.0 * clamp(km - 2.0, 0.0, 1.0) + clamp(km - 3.0, 0.0, 9.0) +
                 0.2 * clamp(km - 12.0, 0.0, 10.0);
   vec2 target = air_view_cell(place, kAirHeights);
   vec2 range = air_view_cell(log(max(range_m, 1e-3) / kAirNearestM) * kAirRangeNodesPerUnit, kAirRanges);
-  int low = first + kAirRanges * int(target.x) + int(range.x);
-  vec4 near = mix(EMIT_AIR_VIEW(low), EMIT_AIR_VIEW(low + 1), range.y);
-  vec4 far = mix(EMIT_AIR_VIEW(low + kAirRanges), EMIT_AIR_VIEW(low + kAirRanges + 1), range.y);
-  return mix(near, far, target.y);
+  return AirPlace(kAirRanges * int(target.x) + int(range.x), kAirRanges, range.y, target.y);
+}
+
+// Place of a direction of the sky.
+AirPlace air_view_sky_place(float sin_elevation) {
+  float x = sin_elevation / kAirElevationScale;
+  float root = log(abs(x) + sqrt(x * x + 1.0));
+  vec2 place = air_view_cell(((x < 0.0 ? -root : root) - kAirFirstElevation) * kAirElevationNodesPerUnit,
+                             kAirElevations);
+  return AirPlace(kAirHeights * kAirRanges + int(place.x), 0, place.y, 0.0);
+}
+
+// Node at a place of the table that starts at `first`. Along a line of sight x, y, z are the logarithm of the mean
+// extinction in m-1 for surfaces near 300 K, hot ones and reflected sunlight, and w is the path radiance by 1 - tau of
+// the first. Towards the sky x, y, z are the optical depth to space for the three sources, and w is the sky's radiance.
+vec4 air_view_node(int first, AirPlace place) {
+  int low = first + place.low;
+  int high = low + place.row;
+  vec4 near = mix(EMIT_AIR_VIEW(low), EMIT_AIR_VIEW(low + 1), place.along);
+  vec4 far = mix(EMIT_AIR_VIEW(high), EMIT_AIR_VIEW(high + 1), place.along);
+  return mix(near, far, place.across);
 }
 
 // Transmittance over a range for a logarithm of the mean extinction.
@@ -49,16 +72,6 @@ float air_view_path_w_m2_sr(vec4 sight, float range_m) {
   // Use the series where the difference would cancel.
   float opacity = depth < 0.01 ? depth * (1.0 - depth * (0.5 - depth / 6.0)) : 1.0 - exp(-depth);
   return opacity * sight.w;
-}
-
-// Node of a direction of the sky: x, y, z = optical depth to space for the three sources; w = radiance of the sky.
-vec4 air_view_sky(int first, float sin_elevation) {
-  float x = sin_elevation / kAirElevationScale;
-  float root = log(abs(x) + sqrt(x * x + 1.0));
-  vec2 place = air_view_cell(((x < 0.0 ? -root : root) - kAirFirstElevation) * kAirElevationNodesPerUnit,
-                             kAirElevations);
-  int low = first + kAirHeights * kAirRanges + int(place.x);
-  return mix(EMIT_AIR_VIEW(low), EMIT_AIR_VIEW(low + 1), place.y);
 }
 
 #endif

@@ -16,10 +16,10 @@ void main() {
   if (row >= row_count) return;
   vec4 place = in_row[row];
   if (place.y > 0.5) {
-    vec4 sky = air_view_sky(int(place.x), place.z);
+    vec4 sky = air_view_node(int(place.x), air_view_sky_place(place.z));
     out_row[row] = vec4(exp(-sky.xyz), sky.w);
   } else {
-    vec4 sight = air_view_sight(int(place.x), place.z, place.w);
+    vec4 sight = air_view_node(int(place.x), air_view_sight_place(place.z, place.w));
     out_row[row] = vec4(air_view_transmittance(sight.x, place.w), air_view_transmittance(sight.y, place.w),
                         air_view_transmittance(sight.z, place.w), air_view_path_w_m2_sr(sight, place.w));
   }

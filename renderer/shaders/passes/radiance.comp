@@ -5,6 +5,7 @@
 //   EMIT_BANDS      number of bands
 //   EMIT_AIR_TERMS  bit per band: the air is a sum of at most EMIT_TERMS exponential terms
 //   EMIT_AIR_TABLE  bit per band: the air is a table
+//   EMIT_AIR_MODEL  bit per band: the air is built in
 //   EMIT_OUTPUTS    planes besides radiance, EMIT_OUTPUT_*
 //   EMIT_ROWS       number of blocks of 8 x 8 pixels, one below the other, that a work group computes
 #include "passes/gbuffer.glsl"
@@ -23,6 +24,9 @@ layout(std430, binding = EMIT_BIND_STATS) buffer Stats { FrameStatsGpu stats; };
 // The tables of the air lie in the same buffer, behind those of the bands.
 #define EMIT_ATMOSPHERE_TABLE(index) texelFetch(band_lut, index).r
 #include "lib/atmosphere_table.glsl"
+layout(binding = EMIT_TEX_AIR) uniform samplerBuffer air_nodes;
+#define EMIT_AIR_VIEW(index) texelFetch(air_nodes, index)
+#include "lib/air_view.glsl"
 
 // Surface that a pixel shows. For a pixel of the sky only `boresight_m` is used.
 struct Seen {
@@ -105,16 +109,34 @@ uvec4 air_table(uint band) {
   return uvec4(bands[band].air_table_first, bands[band].air_table_ranges, bands[band].air_table_elevations, 0u);
 }
 
-// Band radiance that leaves the surface, W m-2 sr-1. Sets `clamped` where the temperature lies outside the table.
-float leaving_w_m2_sr(uint band, Seen seen, inout bool clamped) {
+// Band radiance that leaves the surface, W m-2 sr-1: x = emission and what sky and surroundings send, y = reflected
+// sunlight. Sets `clamped` where the temperature lies outside the table.
+vec2 leaving_w_m2_sr(uint band, Seen seen, inout bool clamped) {
   vec4 lut = vec4(bands[band].lut_first_k, bands[band].lut_nodes_per_k, bands[band].lut_last_node,
                   float(band * frame.band_lut_nodes));
   float emissivity_frac = texelFetch(band_lut, int(frame.first_emissivity + seen.material * EMIT_BANDS + band)).r;
   float emitted = emissivity_frac * planck_lut_radiance_w_m2_sr(seen.temperature_k, lut, clamped);
   // Add the diffuse reflection. The open part of the hemisphere shows sky, the rest the surroundings.
   float incoming = mix(bands[band].surroundings_radiance_w_m2_sr, bands[band].sky_hemisphere_w_m2_sr, seen.open_frac);
-  incoming += bands[band].sun_irradiance_w_m2 / EMIT_PI * seen.sun_cosine;
-  return emitted + (1.0 - emissivity_frac) * incoming;
+  float sunlight = bands[band].sun_irradiance_w_m2 / EMIT_PI * seen.sun_cosine;
+  return vec2(emitted + (1.0 - emissivity_frac) * incoming, (1.0 - emissivity_frac) * sunlight);
+}
+
+// Logarithm of the air's extinction for a surface at a temperature. Between 300 K, 800 K and the sun it is linear in 1 /
+// T (physics.md section 11).
+float log_extinction_at(vec4 sight, float temperature_k) {
+  float inverse = 1.0 / max(temperature_k, 200.0);
+  float warm = (1.0 / 300.0 - inverse) / (1.0 / 300.0 - 1.0 / 800.0);
+  float hot = (1.0 / 800.0 - inverse) / (1.0 / 800.0 - 1.0 / 5772.0);
+  return hot > 0.0 ? mix(sight.y, sight.z, min(hot, 1.0)) : mix(sight.x, sight.y, warm);
+}
+
+// Radiance at the aperture through built-in air, for a surface that sends `leaving` (as above). `sight` is the node of
+// its line of sight.
+float through_air_w_m2_sr(vec4 sight, vec2 leaving, float temperature_k, float range_m) {
+  float thermal = air_view_transmittance(log_extinction_at(sight, temperature_k), range_m);
+  return thermal * leaving.x + air_view_transmittance(sight.z, range_m) * leaving.y +
+         air_view_path_w_m2_sr(sight, range_m);
 }
 
 // Computes and writes all planes of one pixel.
@@ -130,6 +152,11 @@ void write_pixel(ivec2 px) {
   vec3 up = vec3(frame.relworld_from_sensor[0].z, frame.relworld_from_sensor[1].z, frame.relworld_from_sensor[2].z);
   float sin_elevation = dot(up, ray) / ray_length;
   bool surface = seen.boresight_m < EMIT_SKY_DEPTH_M;
+  float range_m = seen.boresight_m * ray_length;
+  // All bands look up their built-in air at one place, whether it lies on a surface or in the sky.
+  AirPlace air_place = air_view_sky_place(sin_elevation);
+  AirPlace sight_place = air_view_sight_place(frame.sensor_height_m + range_m * sin_elevation, range_m);
+  if (surface) air_place = sight_place;
   bool clamped = false;
   bool nonfinite = false;
 
@@ -137,16 +164,20 @@ void write_pixel(ivec2 px) {
   // software rasterisers run both sides of a branch anyway.
   for (uint i = 0u; i < EMIT_BANDS; ++i) {
     bool off_table = false;
-    float leaving = leaving_w_m2_sr(i, seen, off_table);
+    vec2 leaving = leaving_w_m2_sr(i, seen, off_table);
     clamped = clamped || (surface && off_table);
-    float radiance_w_m2_sr = surface ? leaving : 0.0;
-    if ((EMIT_AIR_TABLE >> i & 1u) != 0u) {
-      vec2 air = surface ? atmosphere_table_air(air_table(i), seen.boresight_m * ray_length, sin_elevation, clamped)
+    float radiance_w_m2_sr = surface ? leaving.x + leaving.y : 0.0;
+    if ((EMIT_AIR_MODEL >> i & 1u) != 0u) {
+      vec4 sight = air_view_node(int(bands[i].air_view_first), air_place);
+      float seen_w_m2_sr = through_air_w_m2_sr(sight, leaving, seen.temperature_k, range_m);
+      radiance_w_m2_sr = surface ? seen_w_m2_sr : sight.w;
+    } else if ((EMIT_AIR_TABLE >> i & 1u) != 0u) {
+      vec2 air = surface ? atmosphere_table_air(air_table(i), range_m, sin_elevation, clamped)
                          : atmosphere_table_out(air_table(i), sin_elevation, clamped);
       radiance_w_m2_sr = air.x * radiance_w_m2_sr + air.y;
     } else if ((EMIT_AIR_TERMS >> i & 1u) != 0u) {
       if (surface) {
-        float tau = transmittance(i, seen.boresight_m * ray_length);
+        float tau = transmittance(i, range_m);
         radiance_w_m2_sr = tau * radiance_w_m2_sr + (1.0 - tau) * bands[i].air_radiance_w_m2_sr;
       } else {
         radiance_w_m2_sr = sky_radiance_w_m2_sr(i, sin_elevation);

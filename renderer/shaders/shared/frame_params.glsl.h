@@ -17,7 +17,7 @@ struct FrameParams {
   vec2 ray_at_corner;         // tangents at the outer corner of pixel (0, 0), sensor axes
   uvec2 rendered_px;          // columns and rows of the rendered image
   uint rendered_plane_px;     // number of its pixels
-  uint unused0;
+  float sensor_height_m;      // above sea level
   uvec2 output_px;            // columns and rows of the output image
   uint output_plane_px;       // number of its pixels
   uint unused1;
@@ -152,7 +152,7 @@ struct BandParams {
   uint air_table_first;                 // index of the first float of the air's table (lib/atmosphere_table.glsl)
   uint air_table_ranges;
   uint air_table_elevations;            // 0: the band has no table of the air
-  uint unused0;
+  uint air_view_first;                  // index of the first node of the built-in air (lib/air_view.glsl)
 };
 
 // Counters of one frame. Shaders add to them with atomics.

@@ -25,9 +25,10 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   auto foster = gl::Program::compute("passes/thermal_foster.comp", taps);
   ASSERT_TRUE(foster) << foster.error().text;
   // Use both kinds of air, so that no member of BandParams is optimised away.
-  const gl::Define content[] = {{"EMIT_BANDS", "4u"},      {"EMIT_AIR_TERMS", "5u"},
-                                {"EMIT_AIR_TABLE", "10u"}, {"EMIT_TERMS", "4"},
-                                {"EMIT_OUTPUTS", "0u"},    {"EMIT_ROWS", "1u"}};
+  const gl::Define content[] = {{"EMIT_BANDS", "4u"},     {"EMIT_AIR_TERMS", "5u"},
+                                {"EMIT_AIR_TABLE", "2u"}, {"EMIT_AIR_MODEL", "8u"},
+                                {"EMIT_TERMS", "4"},      {"EMIT_OUTPUTS", "0u"},
+                                {"EMIT_ROWS", "1u"}};
   auto radiance = gl::Program::compute("passes/radiance.comp", content);
   ASSERT_TRUE(radiance) << radiance.error().text;
 
@@ -91,6 +92,9 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   EXPECT_EQ(radiance->uniform_offset("band_uniforms[2].air_table_elevations"),
             static_cast<GLint>(2 * sizeof(gpu::BandParams) +
                                offsetof(gpu::BandParams, air_table_elevations)));
+  EXPECT_EQ(
+      radiance->uniform_offset("band_uniforms[2].air_view_first"),
+      static_cast<GLint>(2 * sizeof(gpu::BandParams) + offsetof(gpu::BandParams, air_view_first)));
   // Check tables that shaders fetch as texels of four floats.
   EXPECT_EQ(sizeof(gpu::MaterialParams), 4U * 16U);
   EXPECT_EQ(offsetof(gpu::MaterialParams, initial_offset_k), 16U);

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tabulated air: every pixel of the shader against the table in double precision.
+// Tabulated and built-in air: every pixel of the shader against the table or the model in double
+// precision.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "emit/physics/air_model.hpp"
 #include "emit/physics/atmosphere_table.hpp"
 #include "emit/physics/constants.hpp"
 #include "emit/physics/planck.hpp"
@@ -115,6 +117,66 @@ TEST(RendererAtmosphere, every_pixel_sees_the_tabulated_air_of_its_line_of_sight
   EXPECT_GT(outside_px, 1000U);
   EXPECT_NEAR(frame.stats.clamped_px, outside_px, 5.0);
   RecordProperty("worst_relative", std::to_string(worst));
+}
+
+TEST(RendererAtmosphere, every_pixel_sees_built_in_air_between_the_heights_of_camera_and_surface) {
+  auto scenario = instant_scenario(write_quads("wide_plane", {ground(20000.0, 20000.0)}));
+  scenario.bands = {{"3-5", 3.0, 5.0, {}}, {"8-12", 8.0, 12.0, {}}};
+  scenario.materials[0].prescribed_k = kSurfaceK;
+  scenario.materials[0].band_emissivity = {{"3-5", 1.0}, {"8-12", 1.0}};
+  scenario.atmosphere.enabled = true;
+  const physics::AirSpec spec{physics::AirClimate::us_standard, 23.0, 1.0};
+  for (const auto& band : scenario.bands) {
+    scene::BandAtmosphere air;
+    air.band = band.name;
+    air.model = spec;
+    scenario.atmosphere.bands.push_back(air);
+  }
+  scenario.place.height_m = 150.0;
+  const auto column = physics::AirColumn::build(spec);
+  ASSERT_TRUE(column) << column.error().text;
+  const auto terms = physics::BandAir::find("8-12");
+  ASSERT_TRUE(terms);
+  const double leaving =
+      physics::band_radiance({8.0, 12.0, {}}, physics::Kelvin(kSurfaceK)).radiance_w_m2_sr;
+  const double air_k = scenario.weather.at(0).air_k;
+  const double warmer_k =
+      (air_k - column->at(150.0).kelvin) * std::exp(150.0 / physics::BandAir::kWarmthScaleM);
+  for (const double height_m : {4.0, 800.0, 6000.0}) {
+    const glm::dvec3 eye{0.0, -30.0, height_m};
+    const physics::Pose pose{eye,
+                             physics::world_from_body_look_at(eye, {0.0, 4000.0, 0.9 * height_m})};
+    const Frame frame = render(scenario, pose);
+    ASSERT_FALSE(frame.radiance.empty());
+    double worst_surface = 0.0;
+    double worst_sky = 0.0;
+    for (std::uint32_t y = 0; y < 256; y += 5) {
+      for (std::uint32_t x = 0; x < 320; x += 20) {
+        const std::size_t i = y * 320 + x;
+        const bool sky = std::isinf(frame.depth_m[i]);
+        const glm::dvec3 ray =
+            world_point(scenario.sensor, pose, x, y, sky ? 1.0 : frame.depth_m[i]) - eye;
+        const double range_m = glm::length(ray);
+        const double sine = ray.z / range_m;
+        if (sky) {
+          if (sine < 0.01) continue;
+          const auto path = physics::AirPath::to_space(*column, 150.0 + height_m, std::asin(sine));
+          const double expected = terms->path_radiance_w_m2_sr(path, warmer_k);
+          worst_sky = std::max(worst_sky, std::abs(frame.radiance[i] / expected - 1.0));
+        } else {
+          const auto path = physics::AirPath::between(*column, 150.0 + height_m, 150.0, range_m);
+          const double expected =
+              terms->transmittance(path, physics::AirSource::black_300k) * leaving +
+              terms->path_radiance_w_m2_sr(path, warmer_k);
+          worst_surface = std::max(worst_surface, std::abs(frame.radiance[i] / expected - 1.0));
+        }
+      }
+    }
+    // These are the errors of the table between its nodes, and of a surface of 350 K taken as one
+    // of 300 K.
+    EXPECT_LT(worst_surface, 0.02) << height_m;
+    EXPECT_LT(worst_sky, 0.03) << height_m;
+  }
 }
 
 TEST(RendererAtmosphere, nothing_is_counted_where_the_grid_covers_the_view) {

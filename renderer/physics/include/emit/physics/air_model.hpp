@@ -28,6 +28,13 @@ enum class AirClimate : std::uint8_t {
 /// Returns the climate of that name, as the enumerator is spelled.
 [[nodiscard]] std::optional<AirClimate> air_climate(std::string_view name) noexcept;
 
+/// Returns the name of a climate, as the enumerator is spelled.
+[[nodiscard]] std::string_view air_climate_name(AirClimate climate) noexcept;
+/// Returns the climate of a latitude at a date (POSIX ns UTC): tropical within 23.5 deg of the
+/// equator, mid-latitude to 55 deg, else subarctic; summer is April to September in the north and
+/// the other half of the year in the south.
+[[nodiscard]] AirClimate air_climate_of(double lat_rad, std::int64_t posix_utc_ns) noexcept;
+
 /// Water vapour at saturation over water, g/m3, by Magnus' formula with the constants of Bolton
 /// (1980). The temperature should lie in 180..330 K.
 [[nodiscard]] double saturated_vapour_g_m3(double kelvin) noexcept;
@@ -42,6 +49,8 @@ struct AirSpec {
   AirClimate climate = AirClimate::midlatitude_summer;
   double visibility_km = 23.0;  ///< of the rural haze below 2 km, 2..50
   double water_ratio = 1.0;     ///< water vapour by that of the climate, 0..5
+
+  [[nodiscard]] bool operator==(const AirSpec&) const = default;
 };
 
 /// Profile of a model atmosphere: how much of each absorber a kilometre of path has by height.

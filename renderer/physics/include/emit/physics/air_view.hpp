@@ -54,12 +54,23 @@ class AirView {
   void at(double sensor_m, double warmer_k, std::span<Node> out) const noexcept;
   static constexpr double kMostWarmerK = 40.0;
 
+  /// Returns the cosine-weighted mean of the sky's radiance over the upper hemisphere at a height,
+  /// W m-2 sr-1. RT-safe.
+  [[nodiscard]] double sky_mean_w_m2_sr(double height_m, double warmer_k) const noexcept;
+  /// Returns the transmittance to space for the third source at a height, by the sine of the
+  /// apparent elevation. RT-safe.
+  [[nodiscard]] double sun_transmittance_frac(double height_m, double sin_elevation) const noexcept;
+
  private:
   /// Node with the logarithm of its radiance for air that is colder, as the climate, and warmer.
   struct Slice {
     std::array<float, 3> air;
     std::array<float, 3> log_radiance;
   };
+  /// Place of a sensor height on the slices, and the shares of the three temperatures.
+  struct Place;
+  [[nodiscard]] Place place_of(double sensor_m, double warmer_k) const noexcept;
+  [[nodiscard]] static float radiance_at(const Place& place, std::size_t node) noexcept;
   std::vector<Slice> slices_;  ///< [sensor][node]
 };
 

@@ -29,6 +29,16 @@ struct SolarIrradiance {
 [[nodiscard]] SolarIrradiance clear_sky_irradiance(const SunPosition& sun, Metres height,
                                                    double linke_turbidity) noexcept;
 
+/// Returns the share of the clear-sky beam that the direct sun has, 0..1.2: `direct_normal_w_m2`,
+/// as measured or modelled below the clouds, over the beam of clear_sky_irradiance(). It is 0 where
+/// that beam is below 1 W m-2.
+[[nodiscard]] double beam_share_frac(double direct_normal_w_m2, const SunPosition& sun,
+                                     Metres height, double linke_turbidity) noexcept;
+
+/// Returns the elevation at which the air's refraction shows the sun, after Saemundsson (1986), for
+/// an airless elevation; below -1 deg it is the airless one.
+[[nodiscard]] Radians apparent_elevation(Radians airless) noexcept;
+
 /// Returns the emissivity of the sky, at most 1, physics.md eq. 12: the Berdahl-Martin form as
 /// recalibrated by Li et al. (2017), plus the cloud term 0.784 (1 - e) n. `cloud_frac` is n and is
 /// clamped to 0..1. The dew point should lie in 230..310 K.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "emit/physics/air_film.hpp"
+#include "emit/physics/air_model.hpp"
 #include "emit/physics/atmosphere_table.hpp"
 #include "emit/physics/frames.hpp"
 #include "emit/physics/weather.hpp"
@@ -276,8 +277,9 @@ struct AtmosphereTerm {
 struct BandAtmosphere {
   std::string band;
   std::vector<AtmosphereTerm> terms;
-  double vertical_transmittance_frac = 0.7;  ///< ground to space; sky = (1 - tau^m) L(air)
-  physics::AtmosphereGrid table = {};        ///< not empty: replaces terms and vertical value
+  double vertical_transmittance_frac = 0.7;    ///< ground to space; sky = (1 - tau^m) L(air)
+  physics::AtmosphereGrid table = {};          ///< not empty: replaces terms and vertical value
+  std::optional<physics::AirSpec> model = {};  ///< built-in air of the band: replaces all of these
 };
 /// Air between surface and sensor, by band.
 struct AtmosphereDesc {
