@@ -83,7 +83,8 @@ server/bench/frame_time: server/tool/command_line server/tool/support server/ben
 server/bench/stream: server/tool/command_line server/tool/support server/tool/streams server/agents server/client server/net server/output server/rt config/include protocol renderer/image renderer/physics renderer/scene
 server/tool/fms_sim: server/axes server/motion server/net server/tool/support config/include protocol renderer/physics
 server/tool/truth: server/tool/support renderer/physics renderer/reference renderer/scene
-server/tool/commands: server/tool/command_line server/tool/engage server/tool/truth server/tool/support server/tool/streams server/tool/view server/tool/fms_sim server/gnss server/motion server/agents/render server/app server/client server/net server/rt config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
+server/tool/nature: server/tool/command_line server/tool/support config/include renderer/physics renderer/scene
+server/tool/commands: server/tool/command_line server/tool/engage server/tool/nature server/tool/truth server/tool/support server/tool/streams server/tool/view server/tool/fms_sim server/gnss server/motion server/agents/render server/app server/client server/net server/rt config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
 server/tool/lab: server/tool/command_line server/tool/support server/tool/commands server/bench/accuracy server/bench/frame_time server/bench/stability server/bench/stream config/include renderer/image renderer/physics renderer/reference renderer/scene renderer/verify
 server/tool: server/tool/commands server/tool/lab server/tool/support
 '

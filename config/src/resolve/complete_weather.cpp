@@ -13,6 +13,7 @@
 #include "emit/physics/sun.hpp"
 #include "emit/physics/weather.hpp"
 #include "keys/node.hpp"
+#include "tables/weather_gaps.hpp"
 
 namespace emit::config {
 
@@ -29,9 +30,6 @@ constexpr std::int64_t kFillStepNs = 900 * kSecondNs;
 constexpr std::int64_t kLongFillNs = 60 * kDayNs;
 constexpr std::int64_t kLongFillStepNs = 3600 * kSecondNs;
 constexpr std::int64_t kLongestFillNs = 400 * kDayNs;
-/// A pause this many times longer than the usual one is a gap, unless it is short.
-constexpr double kGapRatio = 2.5;
-constexpr std::int64_t kShortestGapNs = 1800 * kSecondNs;
 
 double seconds(std::int64_t ns) {
   return static_cast<double>(ns) / 1e9;  // rounded once, so that whole seconds print as such
@@ -159,61 +157,23 @@ ClearSky fitted(std::span<const WeatherSample> rows, const ModelSky& sky,
   return model;
 }
 
-bool same_weather(const WeatherSample& a, const WeatherSample& b) {
-  return a.direct_normal_w_m2 == b.direct_normal_w_m2 &&
-         a.diffuse_horizontal_w_m2 == b.diffuse_horizontal_w_m2 &&
-         a.longwave_down_w_m2 == b.longwave_down_w_m2 && a.air_k == b.air_k &&
-         a.wind_m_s == b.wind_m_s && a.cloud_frac == b.cloud_frac &&
-         a.environment_k == b.environment_k && a.film_w_m2_k == b.film_w_m2_k &&
-         a.wind_from_rad == b.wind_from_rad;
-}
-
-/// Median of the pauses between rows. @pre two rows or more
-std::int64_t usual_spacing_ns(std::span<const WeatherSample> rows) {
-  std::vector<std::int64_t> pauses_ns;
-  for (std::size_t i = 1; i < rows.size(); ++i) {
-    pauses_ns.push_back(rows[i].sim_time_ns - rows[i - 1].sim_time_ns);
-  }
-  EMIT_CHECK(!pauses_ns.empty());
-  const auto middle = pauses_ns.begin() + static_cast<std::ptrdiff_t>((pauses_ns.size() - 1) / 2);
-  std::nth_element(pauses_ns.begin(), middle, pauses_ns.end());
-  return *middle;
-}
-
-/// Returns the usual pause around row i: the median of up to five pauses, of which the one before
-/// row i is the middle. A table may change from rows of a quarter of an hour to hourly rows.
-/// @pre 0 < i < rows.size()
-std::int64_t local_spacing_ns(std::span<const WeatherSample> rows, std::size_t i) {
-  EMIT_CHECK(i > 0 && i < rows.size());
-  const std::size_t first = i >= 3 ? i - 3 : 0;
-  const std::size_t last = std::min(i + 2, rows.size() - 1);
-  return usual_spacing_ns(rows.subspan(first, last - first + 1));
-}
-
-/// Reports pauses between rows from `from_ns` on that are much longer than usual. Nothing is
-/// missing where the weather is the same on both sides.
+/// Warns of the gaps from `from_ns` on.
 void report_gaps(std::string_view name, std::int64_t from_ns, std::int64_t usual_ns,
                  scene::ScenarioDesc& scenario) {
   const std::vector<WeatherSample>& rows = scenario.weather;
   constexpr std::size_t kMaxListed = 3;
-  std::size_t gaps = 0;
+  const std::vector<std::size_t> gaps = weather_gaps(rows, from_ns);
+  if (gaps.empty()) return;
   std::string listed;
-  for (std::size_t i = 1; i < rows.size(); ++i) {
-    const std::int64_t pause_ns = rows[i].sim_time_ns - rows[i - 1].sim_time_ns;
-    if (rows[i].sim_time_ns <= from_ns || pause_ns < kShortestGapNs ||
-        static_cast<double>(pause_ns) <= kGapRatio * static_cast<double>(usual_ns) ||
-        static_cast<double>(pause_ns) <=
-            kGapRatio * static_cast<double>(local_spacing_ns(rows, i)) ||
-        same_weather(rows[i - 1], rows[i])) {
-      continue;
-    }
-    if (++gaps > kMaxListed) continue;
-    listed += fmt::format("{}from {} s to {} s ({})", listed.empty() ? "" : ", ",
-                          seconds(rows[i - 1].sim_time_ns), seconds(rows[i].sim_time_ns),
-                          duration(pause_ns));
+  for (std::size_t k = 0; k < std::min(gaps.size(), kMaxListed); ++k) {
+    const std::int64_t begin_ns = rows[gaps[k] - 1].sim_time_ns;
+    const std::int64_t end_ns = rows[gaps[k]].sim_time_ns;
+    listed += fmt::format("{}from {} s to {} s ({})", listed.empty() ? "" : ", ", seconds(begin_ns),
+                          seconds(end_ns), duration(end_ns - begin_ns));
   }
-  if (gaps == 0) return;
-  if (gaps > kMaxListed) listed += fmt::format(" and {} more", gaps - kMaxListed);
+  if (gaps.size() > kMaxListed) {
+    listed += fmt::format(" and {} more", gaps.size() - kMaxListed);
+  }
   scenario.warnings.push_back(
       fmt::format("{}: the weather has no rows {}; the usual spacing is {} s ({}). In between the "
                   "weather is taken as linear",

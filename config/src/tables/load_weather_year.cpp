@@ -373,6 +373,7 @@ Result<WeatherYear> load_weather_year(const std::filesystem::path& file) {
   const bool epw = is_epw(*text);
   auto year = epw ? read_epw({file, std::move(*text)}) : read_tmy3({file, std::move(*text)});
   if (!year) return year;
+  year->is_epw = epw;
   if (auto checked = check_year(file.string(), *year); !checked) {
     return tl::unexpected<Error>(checked.error());
   }

@@ -34,6 +34,7 @@ struct YearRecord {
 };
 
 struct WeatherYear {
+  bool is_epw = false;  ///< false: TMY3
   std::string site;
   double lat_deg = 0.0;
   double lon_deg = 0.0;
