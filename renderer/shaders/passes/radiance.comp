@@ -89,10 +89,11 @@ float air_mass(float sin_elevation) {
   return 1.0 / (max(sin_elevation, 0.0) + 0.50572 * exp(-1.6364 * log(elevation_deg + 6.07995)));
 }
 
-// Band radiance of the sky in W m-2 sr-1, for air that is a sum of exponential terms.
+// Band radiance of the sky in W m-2 sr-1, for air that is a sum of exponential terms. Clouds stand behind it.
 float sky_radiance_w_m2_sr(uint band, float sin_elevation) {
   float log_vertical = log(max(bands[band].vertical_transmittance_frac, 1e-30));
-  return bands[band].air_radiance_w_m2_sr * (1.0 - exp(log_vertical * air_mass(sin_elevation)));
+  return mix(bands[band].sky_air_radiance_w_m2_sr, bands[band].cloud_radiance_w_m2_sr,
+             exp(log_vertical * air_mass(sin_elevation)));
 }
 
 // Transmittance of the air over a range, 0..1, as a sum of exponential terms.
@@ -174,7 +175,7 @@ void write_pixel(ivec2 px) {
     } else if ((EMIT_AIR_TABLE >> i & 1u) != 0u) {
       vec2 air = surface ? atmosphere_table_air(air_table(i), range_m, sin_elevation, clamped)
                          : atmosphere_table_out(air_table(i), sin_elevation, clamped);
-      radiance_w_m2_sr = air.x * radiance_w_m2_sr + air.y;
+      radiance_w_m2_sr = air.x * (surface ? radiance_w_m2_sr : bands[i].cloud_radiance_w_m2_sr) + air.y;
     } else if ((EMIT_AIR_TERMS >> i & 1u) != 0u) {
       if (surface) {
         float tau = transmittance(i, range_m);
