@@ -8,9 +8,6 @@
 
 #include "emit/physics/band_radiance_lut.hpp"
 #include "emit/physics/clear_sky.hpp"
-#include "emit/physics/climate.hpp"
-#include "emit/physics/sky_state.hpp"
-#include "emit/scene/base.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -39,16 +36,6 @@ double sky_hemisphere_frac(double vertical_transmittance_frac) {
     const double sin_elevation = std::sqrt((i + 0.5) / kRings);
     const double mass = physics::relative_air_mass(physics::Radians(std::asin(sin_elevation)));
     sum += 1.0 - std::pow(vertical_transmittance_frac, mass);
-  }
-  return sum / kRings;
-}
-
-/// Cosine-weighted mean of the transmittance out of a table's air, by the midpoint rule in sin^2.
-double clear_hemisphere_frac(const physics::AtmosphereTable& air) {
-  constexpr int kRings = 256;
-  double sum = 0.0;
-  for (int i = 0; i < kRings; ++i) {
-    sum += air.out(std::sqrt((i + 0.5) / kRings)).transmittance_frac;
   }
   return sum / kRings;
 }
@@ -117,7 +104,6 @@ physics::Result<void> BandModel::build_views(const scene::ScenarioDesc& scenario
       air_nodes_.resize(air_nodes_.size() + physics::AirView::kNodes);
     }
   }
-  if (air_model_ != 0) place_nodes_.resize(physics::AirView::kNodes);
   if (air_nodes_.empty()) air_nodes_.resize(1);
   return {};
 }
@@ -155,7 +141,6 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
       }
       model.air_table_ |= 1U << model.params_.size();
       entry.air_hemisphere_w_m2_sr = air->sky_hemisphere_w_m2_sr();
-      entry.cloud_hemisphere_frac = clear_hemisphere_frac(*air);
       entry.air = std::move(*air);
     } else if (atmosphere != nullptr) {
       if (atmosphere->terms.size() > EMIT_MAX_ATMOSPHERE_TERMS) {
@@ -181,11 +166,6 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
     // Compute the constants of sun and sky.
     entry.sun_outside_w_m2 = sun_outside_w_m2(desc, entry.band);
     entry.sky_hemisphere_frac = sky_hemisphere_frac(entry.vertical_transmittance_frac);
-    if (atmosphere == nullptr) {
-      entry.cloud_hemisphere_frac = 0.0;
-    } else if (!entry.air) {
-      entry.cloud_hemisphere_frac = 1.0 - entry.sky_hemisphere_frac;
-    }
     model.nodes_per_band_ = static_cast<std::uint32_t>(lut->nodes().size());
     model.tables_.insert(model.tables_.end(), lut->nodes().begin(), lut->nodes().end());
     model.params_.push_back(params);
@@ -193,11 +173,6 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
   }
   model.place_m_ = scenario.place.height_m;
   model.turbidity_ = scenario.clear_sky.linke_turbidity;
-  model.cloud_base_ = scenario.clear_sky.cloud_base;
-  // Weather tables state no humidity.
-  model.dew_point_k_ = scenario.weather.empty()
-                           ? scenario.clear_sky.dew_point_k
-                           : physics::usual_dew_point_k(scene::mean_air_k(scenario));
   if (auto views = model.build_views(scenario); !views) return tl::unexpected(views.error());
   // Append the tables of the air behind those of the bands.
   for (std::size_t i = 0; i < model.entries_.size(); ++i) {
@@ -246,8 +221,6 @@ void BandModel::update(const physics::Forcing& forcing, const physics::SunPositi
                                      physics::beam_share_frac(forcing.direct_normal_w_m2, sun,
                                                               physics::Metres(place_m_), turbidity_)
                                : 0.0;
-  const physics::SkyState sky_now =
-      physics::sky_state(forcing.longwave_down_w_m2, forcing.air_k, dew_point_k_, cloud_base_);
   const double sin_sun = std::sin(sun.elevation.value());
   const double sin_shown = std::sin(physics::apparent_elevation(sun.elevation).value());
   for (std::size_t i = 0; i < entries_.size(); ++i) {
@@ -260,37 +233,19 @@ void BandModel::update(const physics::Forcing& forcing, const physics::SunPositi
     params.surroundings_radiance_w_m2_sr = static_cast<float>(
         physics::band_radiance(entry.band, physics::Kelvin(forcing.environment_k))
             .radiance_w_m2_sr);
-    const double cloud_w_m2_sr =
-        physics::band_radiance(entry.band, physics::Kelvin(sky_now.cloud_base_k)).radiance_w_m2_sr;
-    const double sky_air_w_m2_sr =
-        physics::band_radiance(entry.band, physics::Kelvin(forcing.air_k + sky_now.warmer_k))
-            .radiance_w_m2_sr;
-    const double behind_w_m2_sr =
-        entry.cloud_hemisphere_frac > 0.0 ? sky_now.cloud_cover_frac * cloud_w_m2_sr : 0.0;
-    params.sky_air_radiance_w_m2_sr = static_cast<float>(sky_air_w_m2_sr);
-    params.cloud_radiance_w_m2_sr = static_cast<float>(behind_w_m2_sr);
-    double sky_w_m2_sr =
-        sky_air_w_m2_sr * entry.sky_hemisphere_frac + behind_w_m2_sr * entry.cloud_hemisphere_frac;
+    double sky_w_m2_sr = air_w_m2_sr * entry.sky_hemisphere_frac;
     double sun_transmittance_frac = std::pow(entry.vertical_transmittance_frac, air_mass);
     if (entry.view) {
       // The place's air differs from that of the climate, and the difference fades upwards.
       const double warmer_k =
           (forcing.air_k - entry.climate_k) * std::exp(place_m_ / physics::BandAir::kWarmthScaleM);
-      const physics::AirView::Weather weather{
-          .warmer_k = warmer_k,
-          .sky_warmer_k =
-              warmer_k + sky_now.warmer_k * std::exp(place_m_ / physics::BandAir::kWarmthScaleM),
-          .cloud_cover_frac = sky_now.cloud_cover_frac,
-          .cloud_base_m = place_m_ + sky_now.cloud_base_m,
-          .cloud_radiance_w_m2_sr = cloud_w_m2_sr};
       entry.view->at(
-          sensor_m, weather,
+          sensor_m, warmer_k,
           std::span(air_nodes_).subspan(params.air_view_first, physics::AirView::kNodes));
-      entry.view->at(place_m_, weather, place_nodes_);
-      sky_w_m2_sr = physics::AirView::sky_mean_w_m2_sr(place_nodes_);
+      sky_w_m2_sr = entry.view->sky_mean_w_m2_sr(place_m_, warmer_k);
       sun_transmittance_frac = entry.view->sun_transmittance_frac(place_m_, sin_shown);
     } else if (entry.air) {
-      sky_w_m2_sr = entry.air_hemisphere_w_m2_sr + behind_w_m2_sr * entry.cloud_hemisphere_frac;
+      sky_w_m2_sr = entry.air_hemisphere_w_m2_sr;
       sun_transmittance_frac = entry.air->out(sin_sun).transmittance_frac;
     }
     params.sky_hemisphere_w_m2_sr = static_cast<float>(sky_w_m2_sr);

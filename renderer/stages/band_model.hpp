@@ -67,9 +67,6 @@ class BandModel {
     std::optional<physics::AirView> view = std::nullopt;         ///< built-in air
     double climate_k = 0.0;       ///< air temperature of the climate at the ground of the place
     double sun_outside_w_m2 = 0;  ///< in band, normal to the sun, at 1 au
-    /// Mean over the hemisphere of the transmittance of the air in front of the clouds. The clouds
-    /// of bands without built-in air stand behind all of it.
-    double cloud_hemisphere_frac = 1.0;
   };
   /// Makes the views of the bands with built-in air.
   [[nodiscard]] physics::Result<void> build_views(const scene::ScenarioDesc& scenario);
@@ -79,10 +76,7 @@ class BandModel {
   std::uint32_t nodes_per_band_ = 0;
   std::vector<physics::AirView::Node> air_nodes_;
   double place_m_ = 0.0;  ///< height of the world's origin above sea level
-  std::vector<physics::AirView::Node> place_nodes_;  ///< table of a sensor at the place, by band
   double turbidity_ = 0.0;
-  double dew_point_k_ = 0.0;
-  physics::CloudBase cloud_base_;
   std::uint32_t air_model_ = 0;
   std::uint32_t air_terms_ = 0;
   std::uint32_t air_table_ = 0;

@@ -44,23 +44,25 @@ class ProgressMeter {
 [[nodiscard]] std::string progress_text(std::string_view label,
                                         const ProgressMeter::Report& report);
 
-/// Bar of a long work on standard error: share done and time left, up to ten times a second. It is
-/// cleared at the end. Where standard error is no terminal nothing is written. Thread: one owner.
+/// Progress of a long work on standard error. On a terminal it is a bar, which is drawn up to ten
+/// times a second and cleared at the end. Elsewhere it is a line every few seconds, as
+/// ProgressMeter says, and a line at the end when there was one before. Thread: one owner.
 class Progress {
  public:
-  using Write = std::function<void(std::string_view text)>;
+  struct Output {
+    bool terminal = false;
+    std::function<void(std::string_view text)> write;
+  };
 
   /// Writes to standard error by the system's clock. The work has `total` parts; 0 counts as 1.
   Progress(std::string label, std::uint64_t total);
-  /// `write` gets what the terminal shall show; empty: no terminal. `clock` outlives the object.
-  Progress(std::string label, std::uint64_t total, const Clock& clock, Write write);
+  /// `clock` outlives the object.
+  Progress(std::string label, std::uint64_t total, const Clock& clock, Output output);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
   void advance_to(std::uint64_t done);
-  /// Takes the bar away, so that the caller can write lines. The next advance_to() draws it again.
-  void clear();
   /// Clears the bar; called by the destructor too. Later calls do nothing.
   void finish();
 
@@ -70,9 +72,10 @@ class Progress {
   std::string label_;
   std::uint64_t total_;
   const Clock* clock_;
-  Write write_;  ///< empty: nothing is shown
+  Output output_;
   ProgressMeter meter_;
-  std::optional<std::int64_t> drawn_ns_;  ///< none: no bar is on the terminal
+  std::optional<std::int64_t> drawn_ns_;
+  bool lines_written_ = false;
   bool finished_ = false;
 };
 

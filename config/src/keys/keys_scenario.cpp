@@ -152,16 +152,7 @@ const KeyTable<WeatherDraft>& weather_keys() {
                            kDegree),
       number<WeatherDraft>("cloud_frac", "", between(limits::kCloudFrac),
                            EMIT_FIELD(clear_sky.cloud_frac),
-                           "Clear-sky models: share of the direct sun that clouds take, and of "
-                           "the sky that they cover."),
-      number<WeatherDraft>("cloud_base_m", "m", between(0, 12000),
-                           EMIT_FIELD(clear_sky.cloud_base.height_m),
-                           "Height of the clouds' base above the ground. Without it and "
-                           "`cloud_base_k` the base is at 0.941 of the air's temperature."),
-      number<WeatherDraft>("cloud_base_k", "K", between(150, 330),
-                           EMIT_FIELD(clear_sky.cloud_base.kelvin),
-                           "Temperature of the clouds' base. Without it that of air that cools by "
-                           "6.5 K/km up to the base."),
+                           "Clear-sky models: share of the direct sun that clouds take."),
       custom<WeatherDraft>(
           {"sample", "array of tables", "", "", "Weather in this file, see `[[weather.sample]]`.",
            false},
@@ -343,8 +334,8 @@ const KeyTable<AtmosphereDraft>& atmosphere_keys() {
                               "Water vapour of the built-in air, by that of its climate. Without "
                               "it: see Built-in air."),
       path<AtmosphereDraft>("file", EMIT_FIELD(file),
-                            "CSV or tape7 file of the air (see Atmosphere tables). It comes before "
-                            "the model. Bands that a table lacks need `model` written out."),
+                            "CSV file of the air (see Atmosphere tables). It comes before the "
+                            "model. Bands that a grid lacks need `model` written out."),
       custom<AtmosphereDraft>(
           {"band", "array of tables", "", "",
            "Terms or a table in this file, see `[[atmosphere.band]]`. They replace file and model "

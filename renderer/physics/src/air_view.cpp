@@ -64,26 +64,6 @@ ViewCell elevation_cell(float sin_elevation) noexcept {
   return view_cell(((x < 0.0F ? -root : root) - kFirst) * kPerNode, AirView::kElevations);
 }
 
-/// Sines of the sky's nodes.
-const std::array<double, AirView::kElevations>& sky_sines() {
-  static const auto kSines = [] {
-    std::array<double, AirView::kElevations> sines{};
-    for (std::size_t e = 0; e < sines.size(); ++e) sines[e] = std::sin(view_elevation_rad(e));
-    return sines;
-  }();
-  return kSines;
-}
-
-/// Range to the height `climb_m` above a sensor, m, along a straight line over the round earth.
-double range_to_height_m(double sensor_m, double climb_m, double sin_elevation) noexcept {
-  constexpr double kEarthRadiusM = 6371e3;
-  const double down_m = (kEarthRadiusM + sensor_m) * sin_elevation;
-  const double square = down_m * down_m + climb_m * (2.0 * (kEarthRadiusM + sensor_m) + climb_m);
-  // Use the form that does not cancel for lines of sight that climb.
-  return down_m > 0.0 ? (square - down_m * down_m) / (std::sqrt(square) + down_m)
-                      : std::sqrt(square) - down_m;
-}
-
 /// Shares of the sky's nodes in a cosine-weighted mean over the upper hemisphere, by the midpoint
 /// rule in the square of the sine.
 std::array<float, AirView::kElevations> sky_shares() {
@@ -173,38 +153,24 @@ float AirView::radiance_at(const Place& place, std::size_t node) noexcept {
   return std::exp(low + place.fraction * (logarithm(place.high[node]) - low));
 }
 
-void AirView::at(double sensor_m, const Weather& weather, std::span<Node> out) const noexcept {
+void AirView::at(double sensor_m, double warmer_k, std::span<Node> out) const noexcept {
   EMIT_DCHECK(out.size() == kNodes);
-  constexpr std::size_t kSky = kHeights * kRanges;
-  const Place place = place_of(sensor_m, weather.warmer_k);
-  const Place sky = place_of(sensor_m, weather.sky_warmer_k);
+  const Place place = place_of(sensor_m, warmer_k);
   for (std::size_t i = 0; i < kNodes; ++i) {
     for (std::size_t k = 0; k < 3; ++k) {
       const float low = place.low[i].air[k];
       out[i][k] = low + place.fraction * (place.high[i].air[k] - low);
     }
-    out[i][3] = radiance_at(i < kSky ? place : sky, i);
-  }
-  // Cover a share of the sky with clouds, behind the air below them.
-  const double climb_m = weather.cloud_base_m - sensor_m;
-  const auto cover = static_cast<float>(weather.cloud_cover_frac);
-  if (!(cover > 0.0F) || !(climb_m > 0.0)) return;
-  for (std::size_t e = 0; e < kElevations; ++e) {
-    const auto range_m = static_cast<float>(range_to_height_m(sensor_m, climb_m, sky_sines()[e]));
-    const AirSight below = air_sight(out, static_cast<float>(weather.cloud_base_m), range_m);
-    const float cloudy =
-        below.path_radiance_w_m2_sr +
-        below.transmittance_frac[0] * static_cast<float>(weather.cloud_radiance_w_m2_sr);
-    out[kSky + e][3] += cover * (cloudy - out[kSky + e][3]);
+    out[i][3] = radiance_at(place, i);
   }
 }
 
-double AirView::sky_mean_w_m2_sr(std::span<const Node> table) noexcept {
-  EMIT_DCHECK(table.size() == kNodes);
+double AirView::sky_mean_w_m2_sr(double height_m, double warmer_k) const noexcept {
   static const std::array<float, kElevations> kShare = sky_shares();
+  const Place place = place_of(height_m, warmer_k);
   double sum = 0.0;
   for (std::size_t e = 0; e < kElevations; ++e) {
-    sum += static_cast<double>(kShare[e] * table[kHeights * kRanges + e][3]);
+    if (kShare[e] > 0.0F) sum += kShare[e] * radiance_at(place, kHeights * kRanges + e);
   }
   return sum;
 }

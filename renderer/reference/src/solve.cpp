@@ -13,12 +13,9 @@
 #include <numeric>
 #include <optional>
 
-#include "emit/physics/climate.hpp"
-#include "emit/physics/sky_state.hpp"
 #include "emit/physics/weather.hpp"
 #include "emit/reference/surface_forcing.hpp"
 #include "emit/reference/visibility.hpp"
-#include "emit/scene/base.hpp"
 #include "emit/threads/parallel.hpp"
 #include "solve_checkpoint.hpp"
 #include "solve_points.hpp"
@@ -373,11 +370,6 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
   const double beam_frac = (1.0 - cloud_frac_at(scenario, view.sim_time_ns)) *
                            physics::beam_share_frac(now.direct_normal_w_m2, sun, place.height,
                                                     scenario.clear_sky.linke_turbidity);
-  const double dew_point_k = scenario.weather.empty()
-                                 ? scenario.clear_sky.dew_point_k
-                                 : physics::usual_dew_point_k(scene::mean_air_k(scenario));
-  const physics::SkyState sky_now = physics::sky_state(now.longwave_down_w_m2, now.air_k,
-                                                       dew_point_k, scenario.clear_sky.cloud_base);
   const double sensor_m = view.sensor_pose.position_world_m.z;
   std::vector<double> face_k;
   if (solid) {
@@ -386,7 +378,7 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
   }
   for (std::size_t b = 0; b < bands.size(); ++b) {
     BandRadiance& band = bands[b];
-    band.set_air(now.air_k, sun, beam_frac, sky_now);
+    band.set_air(now.air_k, sun, beam_frac);
     // Compute the radiance that every patch sends out.
     const double around = band.black(now.surroundings_k);
     std::vector<double> patch;
@@ -538,20 +530,39 @@ Result<SolvedImage> SceneSolver::image(const SolveView& view) {
 std::optional<PixelHit> SceneSolver::Data::surface_at(const SceneInstant& instant,
                                                       const SolveProbe& probe,
                                                       ProbedPoint& out) const {
-  const auto hit =
-      nearest_surface(instant, probe.position_m, probe.normal, [&](const RayHit& candidate) {
-        return probe.object.empty() || scenario.objects[candidate.object].name == probe.object;
-      });
-  if (!hit) return std::nullopt;
-  glm::dvec3 normal = solid ? hit->geometric_normal : hit->shading_normal;
-  if (glm::dot(normal, hit->geometric_normal) <= 0.0) normal = hit->geometric_normal;
-  if (!hit->front) normal = -normal;
-  out.position_m = hit->position_world_m;
-  out.normal = normal;
-  out.object = hit->object;
-  PixelHit p;
-  p.point = {hit->position_world_m, normal, hit->material, hit->entity};
-  return p;
+  std::vector<glm::dvec3> from;
+  if (probe.normal) {
+    from.push_back(glm::normalize(*probe.normal));
+  } else {
+    for (const double x : {0.0, -1.0, 1.0}) {
+      for (const double y : {0.0, -1.0, 1.0}) {
+        for (const double z : {1.0, -1.0, 0.0}) {
+          if (x != 0.0 || y != 0.0 || z != 0.0) from.push_back(glm::normalize(glm::dvec3(x, y, z)));
+        }
+      }
+    }
+  }
+  std::optional<PixelHit> best;
+  double nearest_m = kProbeReachM;
+  for (const glm::dvec3& outwards : from) {
+    const auto hit =
+        instant.first_hit({probe.position_m + kProbeReachM * outwards, -outwards, 0.0});
+    if (!hit) continue;
+    if (!probe.object.empty() && scenario.objects[hit->object].name != probe.object) continue;
+    const double away_m = glm::distance(hit->position_world_m, probe.position_m);
+    if (away_m >= nearest_m) continue;
+    nearest_m = away_m;
+    PixelHit p;
+    glm::dvec3 normal = solid ? hit->geometric_normal : hit->shading_normal;
+    if (glm::dot(normal, hit->geometric_normal) <= 0.0) normal = hit->geometric_normal;
+    if (!hit->front) normal = -normal;
+    p.point = {hit->position_world_m, normal, hit->material, hit->entity};
+    out.position_m = hit->position_world_m;
+    out.normal = normal;
+    out.object = hit->object;
+    best = p;
+  }
+  return best;
 }
 
 Result<std::vector<ProbedPoint>> SceneSolver::probe(std::span<const SolveProbe> probes,

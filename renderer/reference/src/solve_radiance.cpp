@@ -72,7 +72,6 @@ physics::Result<BandRadiance> BandRadiance::create(const scene::ScenarioDesc& sc
   if (scenario.atmosphere.enabled) {
     for (const scene::BandAtmosphere& entry : scenario.atmosphere.bands) {
       if (entry.band != out.name_) continue;
-      out.has_air_ = true;
       if (entry.model) {
         auto column = physics::AirColumn::build(*entry.model);
         out.air_terms_ = physics::BandAir::find(out.name_);
@@ -97,6 +96,13 @@ physics::Result<BandRadiance> BandRadiance::create(const scene::ScenarioDesc& sc
       break;
     }
   }
+  // Average the sky's emissivity by the midpoint rule over elevation, weight 2 sin cos.
+  constexpr int kRings = 2000;
+  for (int i = 0; i < kRings; ++i) {
+    const double elevation = (i + 0.5) / kRings * physics::kPi / 2.0;
+    out.sky_share_ += (1.0 - std::pow(out.vertical_frac_, air_mass(std::sin(elevation)))) *
+                      std::sin(2.0 * elevation) * physics::kPi / 2.0 / kRings;
+  }
   out.place_m_ = scenario.place.height_m;
   const auto built_in = scenario.bands[band].response.empty() ? physics::BandAir::find(out.name_)
                                                               : std::optional<physics::BandAir>();
@@ -106,34 +112,31 @@ physics::Result<BandRadiance> BandRadiance::create(const scene::ScenarioDesc& sc
   return out;
 }
 
-void BandRadiance::set_air(double air_k, const physics::SunPosition& sun, double beam_frac,
-                           const physics::SkyState& sky_now) {
+void BandRadiance::set_air(double air_k, const physics::SunPosition& sun, double beam_frac) {
+  // The sky radiates like air of the opacity along its direction.
   air_ = black(air_k);
-  sky_now_ = sky_now;
-  sky_air_ = black(air_k + sky_now.warmer_k);
-  cloud_ = black(sky_now.cloud_base_k);
   const double sin_sun = std::sin(sun.elevation.value());
   double through = 0.0;
   if (column_) {
-    const double to_sea_level = std::exp(place_m_ / physics::BandAir::kWarmthScaleM);
-    warmer_k_ = (air_k - column_->at(place_m_).kelvin) * to_sea_level;
-    sky_warmer_k_ = warmer_k_ + sky_now.warmer_k * to_sea_level;
+    warmer_k_ = (air_k - column_->at(place_m_).kelvin) *
+                std::exp(place_m_ / physics::BandAir::kWarmthScaleM);
+    // Average the sky by the midpoint rule over the elevation, weight 2 sin cos.
+    constexpr int kRings = 400;
+    sky_mean_ = 0.0;
+    for (int i = 0; i < kRings; ++i) {
+      const double elevation = (i + 0.5) / kRings * physics::kPi / 2.0;
+      sky_mean_ +=
+          sky(0.0, std::sin(elevation)) * std::sin(2.0 * elevation) * physics::kPi / 2.0 / kRings;
+    }
     const double shown_rad = physics::apparent_elevation(sun.elevation).value();
     through = shown_rad > 0.0 ? air_terms_->transmittance(
                                     physics::AirPath::to_space(*column_, place_m_, shown_rad),
                                     physics::AirSource::sun_lowtran)
                               : 0.0;
   } else {
+    sky_mean_ = table_ ? table_->sky_hemisphere_w_m2_sr() : air_ * sky_share_;
     through = table_ ? table_->out(sin_sun).transmittance_frac
                      : std::pow(vertical_frac_, air_mass(sin_sun));
-  }
-  // Average the sky by the midpoint rule over the elevation, weight 2 sin cos.
-  const int rings = column_ ? 400 : 2000;
-  sky_mean_ = 0.0;
-  for (int i = 0; i < rings; ++i) {
-    const double elevation = (i + 0.5) / rings * physics::kPi / 2.0;
-    sky_mean_ +=
-        sky(0.0, std::sin(elevation)) * std::sin(2.0 * elevation) * physics::kPi / 2.0 / rings;
   }
   sun_w_m2_ = sun_outside_w_m2_ / (sun.distance_au * sun.distance_au) * beam_frac * through;
 }
@@ -185,41 +188,13 @@ double BandRadiance::at_aperture(const Leaving& leaving, double sensor_m, double
 }
 
 double BandRadiance::sky(double sensor_m, double sin_elevation) const {
-  if (!has_air_) return 0.0;
-  const double cover = sky_now_.cloud_cover_frac;
   if (column_) {
-    const double height_m = place_m_ + sensor_m;
-    const auto clear = physics::AirPath::to_space(*column_, height_m,
-                                                  std::asin(std::clamp(sin_elevation, -1.0, 1.0)));
-    const double clear_w_m2_sr = air_terms_->path_radiance_w_m2_sr(clear, sky_warmer_k_);
-    const double climb_m = sky_now_.cloud_base_m - sensor_m;
-    if (!(cover > 0.0) || !(climb_m > 0.0)) return clear_w_m2_sr;
-    // Find where the line of sight meets the sphere of the clouds' base, by bisection.
-    constexpr double kEarthRadiusM = 6371e3;
-    const double from_m = kEarthRadiusM + height_m;
-    double near_m = sin_elevation < 0.0 ? -sin_elevation * from_m : 0.0;
-    double far_m = near_m + 4e6;
-    for (int i = 0; i < 60; ++i) {
-      const double range_m = 0.5 * (near_m + far_m);
-      const double up_m = from_m + range_m * sin_elevation;
-      const double level_m2 = range_m * range_m * (1.0 - sin_elevation * sin_elevation);
-      (std::sqrt(up_m * up_m + level_m2) - from_m < climb_m ? near_m : far_m) = range_m;
-    }
-    // The sky's table ends at 100 km of range, and so does the reference.
-    const double range_m = std::min(near_m, 1e5);
-    const auto below = physics::AirPath::between(*column_, height_m, height_m + climb_m, range_m);
-    const double cloudy_w_m2_sr =
-        air_terms_->path_radiance_w_m2_sr(below, warmer_k_) +
-        air_terms_->transmittance(below, physics::AirSource::black_300k) * cloud_;
-    return (1.0 - cover) * clear_w_m2_sr + cover * cloudy_w_m2_sr;
+    const auto path = physics::AirPath::to_space(*column_, place_m_ + sensor_m,
+                                                 std::asin(std::clamp(sin_elevation, -1.0, 1.0)));
+    return air_terms_->path_radiance_w_m2_sr(path, warmer_k_);
   }
-  // Clouds stand behind all of the air of tables and terms.
-  if (table_) {
-    const auto out = table_->out(sin_elevation);
-    return out.path_radiance_w_m2_sr + out.transmittance_frac * cover * cloud_;
-  }
-  const double through = std::pow(vertical_frac_, air_mass(sin_elevation));
-  return sky_air_ * (1.0 - through) + through * cover * cloud_;
+  if (table_) return table_->out(sin_elevation).path_radiance_w_m2_sr;
+  return air_ * (1.0 - std::pow(vertical_frac_, air_mass(sin_elevation)));
 }
 
 }  // namespace emit::reference

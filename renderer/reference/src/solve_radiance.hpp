@@ -6,7 +6,6 @@
 #include "emit/physics/air_model.hpp"
 #include "emit/physics/atmosphere_table.hpp"
 #include "emit/physics/error.hpp"
-#include "emit/physics/sky_state.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/scene/scene_desc.hpp"
 
@@ -37,10 +36,8 @@ class BandRadiance {
   [[nodiscard]] static physics::Result<BandRadiance> create(const scene::ScenarioDesc& scenario,
                                                             std::size_t band);
 
-  /// Sets the air temperature, the sun, the share of a clear sky's direct sun that shines, and the
-  /// sky.
-  void set_air(double air_k, const physics::SunPosition& sun, double beam_frac,
-               const physics::SkyState& sky_now);
+  /// Sets the air temperature, the sun and the share of a clear sky's direct sun that shines.
+  void set_air(double air_k, const physics::SunPosition& sun, double beam_frac);
   /// Returns the in-band radiance of a blackbody, W m-2 sr-1.
   [[nodiscard]] double black(double kelvin) const { return integral_.radiance_w_m2_sr(kelvin); }
   /// Returns the emissivity of a material in this band.
@@ -72,13 +69,9 @@ class BandRadiance {
   std::optional<physics::AtmosphereTable> table_;
   std::optional<physics::AirColumn> column_;  ///< built-in air, with air_terms_
   std::optional<physics::BandAir> air_terms_;
-  double place_m_ = 0.0;       ///< height of the world's origin above sea level
-  double warmer_k_ = 0.0;      ///< air at sea level against that of the climate
-  double sky_warmer_k_ = 0.0;  ///< the same in the sky
-  physics::SkyState sky_now_;
-  bool has_air_ = false;
-  double cloud_ = 0.0;    ///< radiance of the clouds' base, W m-2 sr-1
-  double sky_air_ = 0.0;  ///< blackbody as warm as the air of the sky
+  double place_m_ = 0.0;    ///< height of the world's origin above sea level
+  double warmer_k_ = 0.0;   ///< air at sea level against that of the climate
+  double sky_share_ = 0.0;  ///< cosine-weighted mean of 1 - tau^m
   double air_ = 0.0;
   double sky_mean_ = 0.0;
   double sun_w_m2_ = 0.0;

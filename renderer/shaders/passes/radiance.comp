@@ -89,11 +89,10 @@ float air_mass(float sin_elevation) {
   return 1.0 / (max(sin_elevation, 0.0) + 0.50572 * exp(-1.6364 * log(elevation_deg + 6.07995)));
 }
 
-// Band radiance of the sky in W m-2 sr-1, for air that is a sum of exponential terms. Clouds stand behind it.
+// Band radiance of the sky in W m-2 sr-1, for air that is a sum of exponential terms.
 float sky_radiance_w_m2_sr(uint band, float sin_elevation) {
   float log_vertical = log(max(bands[band].vertical_transmittance_frac, 1e-30));
-  return mix(bands[band].sky_air_radiance_w_m2_sr, bands[band].cloud_radiance_w_m2_sr,
-             exp(log_vertical * air_mass(sin_elevation)));
+  return bands[band].air_radiance_w_m2_sr * (1.0 - exp(log_vertical * air_mass(sin_elevation)));
 }
 
 // Transmittance of the air over a range, 0..1, as a sum of exponential terms.
@@ -175,7 +174,7 @@ void write_pixel(ivec2 px) {
     } else if ((EMIT_AIR_TABLE >> i & 1u) != 0u) {
       vec2 air = surface ? atmosphere_table_air(air_table(i), range_m, sin_elevation, clamped)
                          : atmosphere_table_out(air_table(i), sin_elevation, clamped);
-      radiance_w_m2_sr = air.x * (surface ? radiance_w_m2_sr : bands[i].cloud_radiance_w_m2_sr) + air.y;
+      radiance_w_m2_sr = air.x * radiance_w_m2_sr + air.y;
     } else if ((EMIT_AIR_TERMS >> i & 1u) != 0u) {
       if (surface) {
         float tau = transmittance(i, range_m);
@@ -199,12 +198,6 @@ void write_pixel(ivec2 px) {
   }
   if ((EMIT_OUTPUTS & EMIT_OUTPUT_OBJECT) != 0u) {
     planes[plane++ * plane_px + pixel] = surface ? float(seen.object) : 0.0;
-  }
-  if ((EMIT_OUTPUTS & EMIT_OUTPUT_SUN) != 0u) {
-    planes[plane++ * plane_px + pixel] = surface ? seen.sun_cosine : uintBitsToFloat(0x7fc00000u);
-  }
-  if ((EMIT_OUTPUTS & EMIT_OUTPUT_SKY) != 0u) {
-    planes[plane++ * plane_px + pixel] = surface ? seen.open_frac : uintBitsToFloat(0x7fc00000u);
   }
   // Count the pixel if it is flagged.
   int flags = (nonfinite ? EMIT_FLAG_NONFINITE : 0) + (clamped ? EMIT_FLAG_CLAMPED : 0);

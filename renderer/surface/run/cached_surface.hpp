@@ -143,10 +143,6 @@ class CachedSurface {
     EMIT_CHECK(model_.has_value());
     return *model_;
   }
-  /// Output of a sample at the time of the latest advance(). @pre prepare(); sample < samples
-  [[nodiscard]] SampleOutput output_now(std::uint32_t sample) const noexcept {
-    return between(nodes_[0].outputs[sample], nodes_[1].outputs[sample], fraction_);
-  }
   /// Main memory of the samples in bytes, without the meshes between them.
   [[nodiscard]] std::uint64_t sample_bytes() const noexcept;
   /// Takes the refined meshes as a scene whose instances are grouped by mesh. Their levels of

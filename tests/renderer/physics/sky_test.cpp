@@ -6,7 +6,6 @@
 #include <glm/geometric.hpp>
 
 #include "emit/physics/clear_sky.hpp"
-#include "emit/physics/sky_state.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/physics/weather.hpp"
 #include "support/times.hpp"
@@ -141,37 +140,6 @@ TEST(ClearSky, LongwaveMatchesTheRecalibratedFormAndCloudsCloseTheWindow) {
   const double clear = sky_emissivity_frac(Kelvin(280.0), 0.0);
   EXPECT_NEAR(sky_emissivity_frac(Kelvin(280.0), 1.0), clear + 0.784 * (1.0 - clear), 1e-14);
   EXPECT_LE(sky_emissivity_frac(Kelvin(330.0), 1.0), 1.0);
-  // Clouds at the ground are as warm as the air, and then the sky is a blackbody.
-  const double black = kStefanBoltzmannWPerM2K4 * std::pow(293.15, 4.0);
-  EXPECT_NEAR(sky_longwave_w_m2(Kelvin(293.15), Kelvin(275.0), 1.0, {.height_m = 0.0}), black,
-              1e-9 * black);
-  // Without a stated base they are those of eq. 12.
-  EXPECT_NEAR(sky_longwave_w_m2(Kelvin(293.15), Kelvin(275.0), 0.7),
-              sky_emissivity_frac(Kelvin(275.0), 0.7) * black, 1e-9 * black);
-}
-
-TEST(SkyState, sends_the_irradiance_that_it_was_made_from) {
-  for (const CloudBase& base :
-       {CloudBase{}, CloudBase{.height_m = 300.0}, CloudBase{.kelvin = 265.0}}) {
-    for (const double cover : {0.0, 0.3, 1.0}) {
-      const double sent = sky_longwave_w_m2(Kelvin(290.0), Kelvin(280.0), cover, base);
-      const SkyState sky = sky_state(sent, 290.0, 280.0, base);
-      EXPECT_NEAR(sky.cloud_cover_frac, cover, 1e-12);
-      EXPECT_NEAR(sky.warmer_k, 0.0, 1e-9);
-    }
-    // Below a clear sky's irradiance the air is colder, above an overcast one's it is warmer.
-    const double clear = sky_longwave_w_m2(Kelvin(290.0), Kelvin(280.0), 0.0, base);
-    const SkyState cold = sky_state(0.9 * clear, 290.0, 280.0, base);
-    EXPECT_EQ(cold.cloud_cover_frac, 0.0);
-    EXPECT_NEAR(std::pow(1.0 + cold.warmer_k / 290.0, 4.0), 0.9, 1e-12);
-    const double overcast = sky_longwave_w_m2(Kelvin(290.0), Kelvin(280.0), 1.0, base);
-    const SkyState warm = sky_state(1.05 * overcast, 290.0, 280.0, base);
-    EXPECT_EQ(warm.cloud_cover_frac, 1.0);
-    EXPECT_NEAR(std::pow(1.0 + warm.warmer_k / 290.0, 4.0), 1.05, 1e-12);
-  }
-  EXPECT_NEAR(sky_state(400.0, 290.0, 280.0, {.height_m = 300.0}).cloud_base_k, 288.05, 1e-9);
-  EXPECT_EQ(sky_state(400.0, 290.0, 280.0, {.kelvin = 263.5}).cloud_base_k, 263.5);
-  EXPECT_GT(sky_state(0.0, 290.0, 280.0, {}).warmer_k, -290.0);
 }
 
 TEST(ClearSky, AirIsWarmestAtThreeInTheAfternoon) {
