@@ -72,6 +72,7 @@ const std::vector<OutputCase>& output_cases() {
     add({"trace", "http://127.0.0.1:1", "--out", "GOOD"}, {"--out"});
     add({"compare", "a.exr", "b.exr"}, {"--json"});
     add({"inspect", "no.glb"}, {"--json"});
+    add({"weather", "no.csv"}, {"--json", "--plot"});
     add({"man"}, {}, {"--out"});
     add({"completion", "bash"}, {"--out"});
     add({"bench", "paper"}, {"--json"});
