@@ -5,5 +5,11 @@
 /// The program emit-lab: `emit` with every command in it. `emit` runs it for those of LabCommands.
 int main(int argc, char** argv) {
   using namespace emit::tool;
-  return run_tool(argc, argv, {add_evaluate, add_fit, add_bench, add_completion, add_man});
+  return run_tool(argc, argv,
+                  {.evaluate = add_evaluate,
+                   .fit = add_fit,
+                   .materials = add_materials,
+                   .bench = add_bench,
+                   .completion = add_completion,
+                   .man = add_man});
 }

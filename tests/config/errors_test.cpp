@@ -271,6 +271,13 @@ const std::vector<Case>& cases() {
        "s.toml:2:1: key 'name' is missing"},
       {"material_band", material("prescribed_k = 400\nband_emissivity_frac = { \"4-5\" = 0.5 }\n"),
        "s.toml:7:26: there is no band '4-5', did you mean '3-5'?"},
+      {"spread_of_no_band",
+       material("prescribed_k = 400\nspread = { band_emissivity_frac = { \"8-13\" = 0.05 } }\n"),
+       "s.toml:7:37: there is no band '8-13', did you mean '8-12'?"},
+      {"spread_key", material("prescribed_k = 400\nspread = { conductivity = 0.2 }\n"),
+       "s.toml:7:12: unknown key 'conductivity', did you mean 'conductivity_frac'?"},
+      {"spread_above_1", material("prescribed_k = 400\nspread = { conductivity_frac = 20 }\n"),
+       "s.toml:7:32: 'conductivity_frac' is 20, must be 0 .. 1"},
       {"layer_thickness",
        material("base_k = 290\nlayers = [{ thickness_m = 0, conductivity_w_m_k = 1, "
                 "density_kg_m3 = 2000, specific_heat_j_kg_k = 900 }]\n"),

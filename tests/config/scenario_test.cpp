@@ -171,7 +171,9 @@ solar_absorptance_frac = 0.7
 emissivity_frac = 0.85
 band_emissivity_frac = { det = 0.8, "3-5" = 0.75 }
 prescribed_k = 450.5
+family = "parts"
 source = "s \"quoted\""
+spread = { solar_absorptance_frac = 0.125, emissivity_frac = 0.0625, band_emissivity_frac = { det = 0.25 }, conductivity_frac = 0.5, heat_capacity_frac = 0.375 }
 uncertainty = "u"
 [[material]]
 name = "deep"
@@ -307,6 +309,15 @@ TEST_F(ConfigTest, every_scenario_key_reaches_its_field) {
   EXPECT_EQ(s.materials[1].prescribed_k, 450.5);
   EXPECT_EQ(s.materials[1].source, "s \"quoted\"");
   ASSERT_EQ(s.materials[1].band_emissivity.size(), 2U);
+  EXPECT_EQ(s.materials[1].family, "parts");
+  ASSERT_TRUE(s.materials[1].spread.has_value());
+  EXPECT_EQ(s.materials[1].spread->solar_absorptance_frac, 0.125);
+  EXPECT_EQ(s.materials[1].spread->emissivity_frac, 0.0625);
+  ASSERT_EQ(s.materials[1].spread->band_emissivity.size(), 1U);
+  EXPECT_EQ(s.materials[1].spread->band_emissivity[0].emissivity_frac, 0.25);
+  EXPECT_EQ(s.materials[1].spread->conductivity_frac, 0.5);
+  EXPECT_EQ(s.materials[1].spread->heat_capacity_frac, 0.375);
+  EXPECT_FALSE(s.materials[2].spread.has_value());
   EXPECT_EQ(s.materials[2].initial_k, 287.25);
   EXPECT_EQ(s.materials[2].base_k, 285.5);
   EXPECT_EQ(s.materials[2].layers[1].density_kg_m3, 1900.0);

@@ -33,15 +33,29 @@ TEST_F(ConfigTest, the_shipped_library_is_complete_and_consistent) {
       {}, options_);
   ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
   std::set<std::string> names;
+  std::set<std::string> families;
   for (const scene::Material& material : loaded->materials) {
     SCOPED_TRACE(material.name);
     names.insert(material.name);
     EXPECT_FALSE(material.source.empty());
-    EXPECT_FALSE(material.uncertainty.empty());
     EXPECT_EQ(material.band_emissivity.size(), 4U);
+    families.insert(material.family);
+    ASSERT_TRUE(material.spread.has_value());
+    EXPECT_GT(material.spread->solar_absorptance_frac, 0.0);
+    EXPECT_GT(material.spread->emissivity_frac, 0.0);
+    ASSERT_EQ(material.spread->band_emissivity.size(), 4U);
+    for (const scene::BandEmissivity& band : material.spread->band_emissivity) {
+      EXPECT_GT(band.emissivity_frac, 0.0) << band.band;
+    }
+    // Materials that are more than dry layers, or are assumed, say so in words.
+    if (!material.dry_layers_valid || material.prescribed_k) {
+      EXPECT_FALSE(material.uncertainty.empty());
+    }
     if (material.prescribed_k) {
       continue;
     }
+    EXPECT_GT(material.spread->conductivity_frac, 0.0);
+    EXPECT_GT(material.spread->heat_capacity_frac, 0.0);
     ASSERT_FALSE(material.layers.empty());
     EXPECT_GT(material.base_k, 0.0);
     ASSERT_FALSE(material.modes.empty());
@@ -53,13 +67,56 @@ TEST_F(ConfigTest, the_shipped_library_is_complete_and_consistent) {
     }
     EXPECT_NEAR(sum, 1.0, 1e-9);
   }
-  for (const char* name :
-       {"asphalt", "concrete",      "asphalt_paper", "concrete_paper", "grass",
-        "soil",    "sand",          "steel",         "aluminium",      "painted_metal",
-        "glass",   "rubber",        "water",         "snow",           "wood",
-        "brick",   "roof_concrete", "runway_paint",  "aircraft_skin",  "fabric",
-        "stone",   "steel_sheet"}) {
+  for (const char* name : {"asphalt",
+                           "concrete",
+                           "brick",
+                           "roof_bitumen",
+                           "roof_tile_clay",
+                           "roof_metal",
+                           "vehicle_white",
+                           "vehicle_black",
+                           "camouflage_paint",
+                           "camouflage_net",
+                           "tarpaulin",
+                           "rubber",
+                           "glass",
+                           "composite_carbon",
+                           "gravel",
+                           "sand",
+                           "sand_wet",
+                           "clay",
+                           "loam",
+                           "lawn",
+                           "crops",
+                           "canopy_needle",
+                           "canopy_leaf",
+                           "snow_fresh",
+                           "snow_old",
+                           "ice",
+                           "water",
+                           "aluminium",
+                           "steel",
+                           "painted_metal",
+                           "runway_paint",
+                           "aircraft_skin",
+                           "fabric",
+                           "stone",
+                           "steel_sheet",
+                           "asphalt_paper",
+                           "concrete_paper",
+                           "grass",
+                           "soil",
+                           "wood",
+                           "roof_concrete"}) {
     EXPECT_EQ(names.count(name), 1U) << name;
+  }
+  EXPECT_EQ(families.count(""), 0U);
+  EXPECT_GE(families.size(), 10U);
+  // Evaporation, melting and stirring are named wherever they matter.
+  for (const scene::Material& material : loaded->materials) {
+    const bool moist = material.family == "vegetation" ||
+                       material.family == "water, snow and ice" || material.name.ends_with("_wet");
+    EXPECT_TRUE(!moist || !material.dry_layers_valid) << material.name;
   }
 }
 

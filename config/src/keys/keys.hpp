@@ -111,6 +111,7 @@ struct DaemonHead {
 [[nodiscard]] const KeyTable<scene::RelaxationMode>& mode_keys();
 [[nodiscard]] const KeyTable<scene::FosterMode>& foster_mode_keys();
 [[nodiscard]] const KeyTable<scene::FosterFit>& foster_fit_keys();
+[[nodiscard]] const KeyTable<scene::MaterialSpread>& spread_keys();
 
 [[nodiscard]] const KeyTable<DaemonHead>& daemon_head_keys();
 [[nodiscard]] const KeyTable<SourceConfig>& source_keys();

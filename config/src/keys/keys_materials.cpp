@@ -10,6 +10,7 @@ using scene::FosterFit;
 using scene::FosterMode;
 using scene::Layer;
 using scene::Material;
+using scene::MaterialSpread;
 using scene::RelaxationMode;
 using scene::Roughness;
 
@@ -64,11 +65,12 @@ namespace {
 
 // The keys of a material that hold tables, each with what is checked across its entries.
 
-Key<Material> band_emissivity_key() {
-  return custom<Material>(
-      {"band_emissivity_frac", "table", "", "0 .. 1",
-       "Emissivities by name of the band. Other bands use `emissivity_frac`.", false},
-      [](Material& out, const Node& node, Diagnostics& diagnostics) {
+/// Returns the key `band_emissivity_frac` of a struct that has a number per band.
+template <class T>
+Key<T> band_emissivity_key(std::string meaning) {
+  return custom<T>(
+      {"band_emissivity_frac", "table", "", "0 .. 1", std::move(meaning), false},
+      [](T& out, const Node& node, Diagnostics& diagnostics) {
         if (!expect_table(node, "band_emissivity_frac", diagnostics)) {
           return;
         }
@@ -78,7 +80,7 @@ Key<Material> band_emissivity_key() {
           out.band_emissivity.push_back({member.key, value});
         }
       },
-      [](const Material& in) -> std::optional<std::string> {
+      [](const T& in) -> std::optional<std::string> {
         if (in.band_emissivity.empty()) {
           return std::nullopt;
         }
@@ -88,6 +90,25 @@ Key<Material> band_emissivity_key() {
                  toml_number(entry.emissivity_frac);
         }
         return out + " }";
+      });
+}
+
+Key<Material> spread_key() {
+  return custom<Material>(
+      {"spread", "table", "", "",
+       "Half-widths of the ranges in which the numbers lie, for lists and plots. See `spread` "
+       "below.",
+       false},
+      [](Material& out, const Node& node, Diagnostics& diagnostics) {
+        if (expect_table(node, "spread", diagnostics)) {
+          read_table(node, spread_keys(), out.spread.emplace(), diagnostics);
+        }
+      },
+      [](const Material& in) -> std::optional<std::string> {
+        if (!in.spread) {
+          return std::nullopt;
+        }
+        return inline_table(*in.spread, spread_keys());
       });
 }
 
@@ -202,6 +223,24 @@ Key<Material> base_k_key() {
 
 }  // namespace
 
+const KeyTable<MaterialSpread>& spread_keys() {
+  static const KeyTable<MaterialSpread> keys = {
+      number<MaterialSpread>("solar_absorptance_frac", "", between(0, 1),
+                             EMIT_FIELD(solar_absorptance_frac),
+                             "Added to and taken from `solar_absorptance_frac`."),
+      number<MaterialSpread>(
+          "emissivity_frac", "", between(0, 1), EMIT_FIELD(emissivity_frac),
+          "Added to and taken from `emissivity_frac`, and from bands that are not listed."),
+      band_emissivity_key<MaterialSpread>("The same by name of the band."),
+      number<MaterialSpread>("conductivity_frac", "", between(0, 1), EMIT_FIELD(conductivity_frac),
+                             "Share of the conductivity of every layer: 0.2 is +-20 %."),
+      number<MaterialSpread>("heat_capacity_frac", "", between(0, 1),
+                             EMIT_FIELD(heat_capacity_frac),
+                             "Share of the heat capacity of every layer."),
+  };
+  return keys;
+}
+
 const KeyTable<Material>& material_keys() {
   static const KeyTable<Material> keys = {
       required(text<Material>("name", EMIT_FIELD(name), "Unique name of the material.")),
@@ -211,7 +250,8 @@ const KeyTable<Material>& material_keys() {
       required(number<Material>("emissivity_frac", "", between(0.01, 1),
                                 EMIT_FIELD(emissivity_frac),
                                 "Total hemispherical emissivity in the long-wave infrared.")),
-      band_emissivity_key(),
+      band_emissivity_key<Material>(
+          "Emissivities by name of the band. Other bands use `emissivity_frac`."),
       layers_key(),
       choice<Material>("roughness",
                        std::vector<std::pair<std::string, Roughness>>{
@@ -252,8 +292,12 @@ const KeyTable<Material>& material_keys() {
       number<Material>(
           "prescribed_k", "K", between(100, 5000), EMIT_FIELD(prescribed_k),
           "Given temperature of a part, such as a hot engine. It has no thermal simulation."),
+      text<Material>("family", EMIT_FIELD(family),
+                     "Kind of material, by which `emit materials` groups."),
       text<Material>("source", EMIT_FIELD(source), "Source of the numbers."),
-      text<Material>("uncertainty", EMIT_FIELD(uncertainty), "Known uncertainty of the numbers."),
+      spread_key(),
+      text<Material>("uncertainty", EMIT_FIELD(uncertainty),
+                     "What else limits the numbers, beyond `spread`."),
   };
   return keys;
 }

@@ -72,6 +72,10 @@ const std::vector<SectionDoc>& scenario_sections() {
                   "A state x of a material, driven by the net flux q into the surface: tau x' = "
                   "resistance q - x. The surface has `base_k` plus the sum of the states.",
                   foster_mode_keys(), scene::FosterMode{}),
+      section_doc("material.spread", false,
+                  "Uncertainty of a material: half-widths of the ranges in which published values "
+                  "lie. 0 says nothing.",
+                  spread_keys(), scene::MaterialSpread{}),
       section_doc("display", false, "Limits of the false-colour display.", display_keys(),
                   scene::DisplayOptions{}),
   };

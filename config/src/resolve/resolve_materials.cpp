@@ -40,6 +40,19 @@ void append_library(const std::filesystem::path& file, std::vector<Node>& nodes,
   }
 }
 
+/// Reports names in the table `band_emissivity_frac` of a node that no band has.
+void check_bands(const Node& node, const std::vector<std::string>& known_bands,
+                 Diagnostics& diagnostics) {
+  const Node* bands = node.find("band_emissivity_frac");
+  if (bands == nullptr || bands->kind != Node::Kind::table) return;
+  for (const Member& member : bands->members) {
+    if (std::find(known_bands.begin(), known_bands.end(), member.key) == known_bands.end()) {
+      diagnostics.add(member.key_at, fmt::format("there is no band '{}'{}", member.key,
+                                                 did_you_mean(member.key, known_bands)));
+    }
+  }
+}
+
 void check_material(const Material& material, const Node& node,
                     const std::vector<std::string>& known_bands, Diagnostics& diagnostics) {
   if (node.has("name") && material.name.empty()) {
@@ -80,15 +93,8 @@ void check_material(const Material& material, const Node& node,
                                   of_modes, of_layers));
     }
   }
-  if (const Node* bands = node.find("band_emissivity_frac");
-      bands != nullptr && bands->kind == Node::Kind::table) {
-    for (const Member& member : bands->members) {
-      if (std::find(known_bands.begin(), known_bands.end(), member.key) == known_bands.end()) {
-        diagnostics.add(member.key_at, fmt::format("there is no band '{}'{}", member.key,
-                                                   did_you_mean(member.key, known_bands)));
-      }
-    }
-  }
+  check_bands(node, known_bands, diagnostics);
+  if (const Node* spread = node.find("spread")) check_bands(*spread, known_bands, diagnostics);
 }
 
 }  // namespace

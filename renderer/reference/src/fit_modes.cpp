@@ -156,10 +156,14 @@ Result<std::vector<std::vector<Mode>>> foster_starts(const scene::Material& mate
     layers.push_back({layer.thickness_m, layer.conductivity_w_m_k,
                       layer.density_kg_m3 * layer.specific_heat_j_kg_k});
   }
-  constexpr double kPeriods[][2] = {
-      {600.0, 172'800.0}, {60.0, 172'800.0}, {200.0, 86'400.0}, {60.0, 20'000.0}};
+  // The last range finds the minimum of dry soil over moist soil, whose slow modes matter.
+  constexpr double kPeriods[][2] = {{600.0, 172'800.0},
+                                    {60.0, 172'800.0},
+                                    {200.0, 86'400.0},
+                                    {60.0, 20'000.0},
+                                    {600.0, 864'000.0}};
   std::vector<std::vector<Mode>> starts;
-  for (std::uint32_t i = 0; i < std::clamp(options.starts, 1U, 4U); ++i) {
+  for (std::uint32_t i = 0; i < std::clamp(options.starts, 1U, 5U); ++i) {
     auto network = physics::network_of_stack(layers, {.modes = options.modes,
                                                       .shortest_period_s = kPeriods[i][0],
                                                       .longest_period_s = kPeriods[i][1]});
@@ -183,6 +187,20 @@ std::vector<std::vector<Mode>> emit2014_starts(const FitOptions& options) {
       starts.push_back({{fast_s, 0.5}, {slow_s, 0.5}});
   }
   return starts;
+}
+
+/// Returns the network of the modes of a material, else of those of its layers.
+Result<physics::FosterNetwork> own_network(const scene::Material& material,
+                                           const FitOptions& options, double resistance_m2k_w) {
+  physics::FosterNetwork network;
+  for (const scene::FosterMode& mode : material.foster_modes) {
+    if (network.count == physics::kMaxFosterModes) break;
+    network.modes[network.count++] = {mode.tau_s, mode.resistance_m2k_w};
+  }
+  if (network.count > 0) return network;
+  auto starts = foster_starts(material, options);
+  if (!starts) return tl::unexpected(std::move(starts.error()));
+  return network_of(starts->front(), resistance_m2k_w);
 }
 
 /// Returns the largest errors over the judged histories.
@@ -273,22 +291,40 @@ Result<FitResult> judge_material(const scene::Material& material,
     result.modes = material.modes;
     emit2014_residuals(*problem, result.modes, residuals);
   } else {
-    // Use the modes of the material, else those of its layers.
-    for (const scene::FosterMode& mode : material.foster_modes) {
-      if (result.network.count == physics::kMaxFosterModes) break;
-      result.network.modes[result.network.count++] = {mode.tau_s, mode.resistance_m2k_w};
-    }
-    if (result.network.count == 0) {
-      auto starts = foster_starts(material, options);
-      if (!starts) return tl::unexpected(std::move(starts.error()));
-      result.network = network_of(starts->front(), problem->resistance_m2k_w);
-    }
+    auto network = own_network(material, options, problem->resistance_m2k_w);
+    if (!network) return tl::unexpected(std::move(network.error()));
+    result.network = *network;
     foster_residuals(*problem, result.network, residuals);
   }
   result.residuals = summarise(*problem, residuals);
   worst_of(result.residuals, result.rms_k, result.max_k);
   result.converged = true;
   return result;
+}
+
+Result<std::vector<CoursePoint>> day_course(const scene::Material& material,
+                                            std::span<const GroundForcing> forcing, double end_s,
+                                            double initial_k, const FitOptions& options) {
+  // The spin-up of a problem has the day as its end. The histories after it are not needed.
+  FitOptions short_options = options;
+  short_options.history_s = 20.0;
+  const auto problem = material_problem(material, forcing, end_s, initial_k, short_options);
+  if (!problem) return tl::unexpected(problem.error());
+  const auto network = own_network(material, options, problem->resistance_m2k_w);
+  if (!network) return tl::unexpected(network.error());
+  std::vector<double> residuals;
+  foster_residuals(*problem, *network, residuals);
+
+  // Residuals come first for the spin-up, and are there where a step has a weight.
+  std::vector<CoursePoint> course;
+  double time_s = end_s - options.spin_up_s;
+  for (const FitStep& step : problem->beginning.steps) {
+    time_s += step.dt_s;
+    if (step.weight <= 0.0) continue;
+    const double error_k = residuals[course.size()] / step.weight;
+    course.push_back({time_s, step.truth_k, step.truth_k + error_k});
+  }
+  return course;
 }
 
 Result<FitResult> fit_curve(const scene::Material& material, std::span<const CurvePoint> curve,

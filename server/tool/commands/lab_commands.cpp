@@ -44,6 +44,7 @@ void add(CommandLine& tool, const CommandText& text) {
 LabCommands forwarded_lab_commands() {
   return {.evaluate = [](CommandLine& tool) { add(tool, kEvaluateText); },
           .fit = [](CommandLine& tool) { add(tool, kFitText); },
+          .materials = [](CommandLine& tool) { add(tool, kMaterialsText); },
           .bench = [](CommandLine& tool) { add(tool, kBenchText); },
           .completion = [](CommandLine& tool) { add(tool, kCompletionText); },
           .man = [](CommandLine& tool) { add(tool, kManText); }};

@@ -25,6 +25,10 @@ inline const CommandText kFitText{
     .example =
         "emit fit block-on-road --material asphalt --modes 4 --json fit.json --out "
         "library.toml"};
+inline const CommandText kMaterialsText{
+    .name = "materials",
+    .text = "List, compare, plot and check the materials of a library",
+    .example = "emit materials lawn sand_wet --plot lawn.svg"};
 inline const CommandText kManText{
     .name = "man",
     .text = "Print the manual page of a command, for man -l; or write all pages",
@@ -34,6 +38,7 @@ inline const CommandText kManText{
 struct LabCommands {
   void (*evaluate)(CommandLine& tool);
   void (*fit)(CommandLine& tool);
+  void (*materials)(CommandLine& tool);
   void (*bench)(CommandLine& tool);
   void (*completion)(CommandLine& tool);
   void (*man)(CommandLine& tool);

@@ -21,7 +21,9 @@ std::string fit_key(scene::Material material) {
   material.foster_modes.clear();
   material.foster_fit.reset();
   material.band_emissivity.clear();
+  material.family.clear();
   material.source.clear();
+  material.spread.reset();
   material.uncertainty.clear();
   return config::print_material(material);
 }

@@ -9,6 +9,7 @@ void add_bench(CommandLine& tool);
 void add_completion(CommandLine& tool);
 void add_evaluate(CommandLine& tool);
 void add_fit(CommandLine& tool);
+void add_materials(CommandLine& tool);
 void add_man(CommandLine& tool);
 
 }  // namespace emit::tool

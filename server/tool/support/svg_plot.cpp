@@ -21,9 +21,9 @@ constexpr double kTop = 34.0;
 constexpr double kBottom = 58.0;
 constexpr double kLegendLine = 15.0;
 
-/// Palette of Okabe and Ito, whose colours differ for any colour vision.
-constexpr std::array<const char*, 7> kColors{"#0072b2", "#e69f00", "#009e73", "#cc79a7",
-                                             "#56b4e9", "#d55e00", "#8c6d1f"};
+/// Palette of Okabe and Ito, whose colours differ for any colour vision, and a grey.
+constexpr std::array<const char*, 8> kColors{"#0072b2", "#e69f00", "#009e73", "#cc79a7",
+                                             "#56b4e9", "#d55e00", "#8c6d1f", "#808080"};
 
 std::string escaped(const std::string& text) {
   std::string out;
@@ -132,7 +132,18 @@ class PlotWriter {
         }
         x_.include(point.x);
         y_.include(point.y);
+        if (point.range) {
+          y_.include(point.range->low);
+          y_.include(point.range->high);
+        }
       }
+    }
+    if (!plot.x.names.empty()) {
+      // Half a place on the left, and room for the legend on the right.
+      constexpr double kLegendShare = 0.4;
+      const auto count = static_cast<double>(plot.x.names.size());
+      x_.include(0.5);
+      x_.include((1.0 + kLegendShare) * count + 0.5);
     }
     x_.settle();
     y_.settle();
@@ -144,12 +155,16 @@ class PlotWriter {
     const Corner corner = emptiest_corner();
     double legend_y = corner.top ? kTop + 16.0 : kHeight - kBottom + 6.0 - legend_height();
     for (const PlotSeries& series : plot_.series) {
+      // Lines beyond the palette have the same colours and the other kind of line.
+      const bool again = !series.emphasis && color / kColors.size() % 2 == 1;
+      const bool dashed = series.dashed != again;
       const std::string ink = series.emphasis ? "#111111" : kColors[color++ % kColors.size()];
-      write_series(series, ink);
+      write_series(series, ink, dashed);
       if (series.label.empty()) continue;
       // A white rim keeps the text legible over lines.
-      append(R"(<circle cx="{:.1f}" cy="{:.1f}" r="4" fill="{}"/>)",
-             corner.left ? kLeft + 10.0 : kWidth - kRight - 10.0, legend_y - 4.0, ink);
+      append(R"(<circle cx="{:.1f}" cy="{:.1f}" r="4" fill="{}" stroke="{}"/>)",
+             corner.left ? kLeft + 10.0 : kWidth - kRight - 10.0, legend_y - 4.0,
+             dashed ? "#fff" : ink, ink);
       append(R"(<text x="{:.1f}" y="{:.1f}" text-anchor="{}" class="legend">{}</text>)",
              corner.left ? kLeft + 20.0 : kWidth - kRight - 20.0, legend_y,
              corner.left ? "start" : "end", escaped(series.label));
@@ -210,7 +225,13 @@ class PlotWriter {
   void write_frame() {
     append(R"(<text x="{:.1f}" y="20" text-anchor="middle" class="title">{}</text>)",
            0.5 * (kLeft + kWidth - kRight), escaped(plot_.title));
+    for (std::size_t i = 0; i < plot_.x.names.size(); ++i) {
+      append(R"(<text x="{:.1f}" y="{}" text-anchor="middle">{}</text>)",
+             x_.px(static_cast<double>(i + 1)), kHeight - kBottom + 16.0,
+             escaped(plot_.x.names[i]));
+    }
     for (const Scale::Tick& tick : x_.ticks()) {
+      if (!plot_.x.names.empty()) break;
       const double at = x_.px(tick.value);
       append(R"(<line x1="{0:.1f}" x2="{0:.1f}" y1="{1}" y2="{2}" class="{3}"/>)", at, kTop,
              kHeight - kBottom, tick.labelled ? "grid" : "fine");
@@ -237,15 +258,23 @@ class PlotWriter {
         0.5 * (kTop + kHeight - kBottom), escaped(plot_.y.label));
   }
 
-  void write_series(const PlotSeries& series, const std::string& ink) {
+  void write_series(const PlotSeries& series, const std::string& ink, bool dashed) {
     std::string path;
     for (const PlotPoint& point : series.points) {
       if (!x_.shows(point.x) || !y_.shows(point.y)) continue;
       path += fmt::format("{:.1f},{:.1f} ", x_.px(point.x), y_.px(point.y));
     }
     if (series.line && !path.empty()) {
-      append(R"(<polyline points="{}" fill="none" stroke="{}" stroke-width="{}"/>)", path, ink,
-             series.emphasis ? 2.5 : 1.5);
+      append(R"(<polyline points="{}" fill="none" stroke="{}" stroke-width="{}"{}/>)", path, ink,
+             series.emphasis ? 2.5 : 1.5, dashed ? R"( stroke-dasharray="6 3")" : "");
+    }
+    for (const PlotPoint& point : series.points) {
+      if (!point.range || !x_.shows(point.x) || !y_.shows(point.range->low) ||
+          !y_.shows(point.range->high)) {
+        continue;
+      }
+      append(R"(<line x1="{0:.1f}" x2="{0:.1f}" y1="{1:.1f}" y2="{2:.1f}" stroke="{3}"/>)",
+             x_.px(point.x), y_.px(point.range->low), y_.px(point.range->high), ink);
     }
     if (!series.markers) return;
     for (const PlotPoint& point : series.points) {

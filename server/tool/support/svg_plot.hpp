@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,12 +14,20 @@ enum class PlotScale : unsigned char { linear, logarithmic };
 struct PlotAxis {
   std::string label;  ///< with the unit
   PlotScale scale = PlotScale::linear;
+  std::vector<std::string> names{};  ///< of the values 1, 2, 3 ... of a linear x axis of kinds
+};
+
+/// Ends of a bar.
+struct PlotRange {
+  double low = 0.0;
+  double high = 0.0;
 };
 
 struct PlotPoint {
   double x = 0.0;
   double y = 0.0;
-  std::string title;  ///< shown by a viewer under the pointer; may be empty
+  std::string title;                              ///< shown under the pointer; may be empty
+  std::optional<PlotRange> range = std::nullopt;  ///< of y: a bar through the point
 };
 
 struct PlotSeries {
@@ -27,6 +36,7 @@ struct PlotSeries {
   bool line = false;      ///< joined in the order given
   bool markers = true;    ///< a dot at every point
   bool emphasis = false;  ///< thick and dark, for the data that the reader should see first
+  bool dashed = false;
 };
 
 /// One diagram. Points that an axis cannot show (NaN, or not positive on a logarithmic axis) are

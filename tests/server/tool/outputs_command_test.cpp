@@ -73,6 +73,7 @@ const std::vector<OutputCase>& output_cases() {
     add({"compare", "a.exr", "b.exr"}, {"--json"});
     add({"inspect", "no.glb"}, {"--json"});
     add({"weather", "no.csv"}, {"--json", "--plot"});
+    add({"materials"}, {"--json", "--plot"});
     add({"man"}, {}, {"--out"});
     add({"completion", "bash"}, {"--out"});
     add({"bench", "paper"}, {"--json"});

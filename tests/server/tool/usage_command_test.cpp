@@ -23,13 +23,13 @@ INSTANTIATE_TEST_SUITE_P(Commands, CliHelp,
                                          "demo", "engage", "view", "compare", "inspect", "evaluate",
                                          "generate", "log", "make-log", "bench", "latency",
                                          "trigger", "trace", "solve", "fit", "fms-sim", "man",
-                                         "export", "weather"));
+                                         "export", "weather", "materials"));
 
 TEST(CliUsage, commands_of_emit_lab_are_those_of_emit) {
   const std::string folder = EMIT_TEST_BIN_DIR;
   const std::string help = run_emit({"--help"}).out;
   EXPECT_EQ(run_process({folder + "/emit-lab", "--help"}).out, help);
-  for (const char* command : {"bench", "evaluate", "fit", "man", "completion"}) {
+  for (const char* command : {"bench", "evaluate", "fit", "materials", "man", "completion"}) {
     EXPECT_NE(help.find(std::string("\n  ") + command + " "), std::string::npos) << command;
     EXPECT_EQ(run_emit({command, "--help"}).out,
               run_process({folder + "/emit-lab", command, "--help"}).out);

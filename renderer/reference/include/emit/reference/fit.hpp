@@ -48,7 +48,7 @@ struct CurvePoint {
 struct FitOptions {
   FitModel model = FitModel::foster;
   std::size_t modes = 4;  ///< 1..4 for foster, 1..2 for emit2014
-  std::uint32_t starts = 4;
+  std::uint32_t starts = 5;
   double spin_up_s = 172'800.0;  ///< length of the unshadowed time before the histories
   double history_s = 12'600.0;   ///< length of the histories
   double reference_tolerance_k = 1e-3;
@@ -94,6 +94,20 @@ struct FitResult {
                                                         std::span<const GroundForcing> forcing,
                                                         double start_s, double initial_k,
                                                         const FitOptions& options = {});
+
+/// Temperature of an open, level surface at an instant.
+struct CoursePoint {
+  double time_s = 0.0;
+  double reference_k = 0.0;  ///< by the reference solver
+  double model_k = 0.0;      ///< by the modes that judge_material() takes
+};
+
+/// Returns the course of a material in sun over the day that ends at `end_s`, a point every five
+/// minutes. The spin-up of the options ends with it. `forcing` must reach from `end_s - spin_up_s`
+/// to 20 s after `end_s`. Errors: those of fit_material().
+[[nodiscard]] physics::Result<std::vector<CoursePoint>> day_course(
+    const scene::Material& material, std::span<const GroundForcing> forcing, double end_s,
+    double initial_k, const FitOptions& options = {});
 
 /// Fits to a measured or computed curve. The material gives emissivity, layers and base; both
 /// models start at the first temperature of the curve. Errors: those of fit_material().

@@ -99,6 +99,15 @@ enum class Roughness : std::uint8_t {
   return kFactors[static_cast<std::size_t>(roughness)];
 }
 
+/// Half-widths of the ranges in which the numbers of a material lie. 0: not stated.
+struct MaterialSpread {
+  double solar_absorptance_frac = 0.0;
+  double emissivity_frac = 0.0;  ///< of the total, and of the bands that are not listed
+  std::vector<BandEmissivity> band_emissivity;
+  double conductivity_frac = 0.0;   ///< share of the conductivity of every layer
+  double heat_capacity_frac = 0.0;  ///< share of the heat capacity of every layer
+};
+
 /// Thermal and optical properties of a surface and of the body under it.
 struct Material {
   std::string name;
@@ -127,8 +136,10 @@ struct Material {
   /// True for both faces of a thin body, whose layers are half of it over an insulated middle (see
   /// sheets.hpp). Then base_k counts for emit2014 only.
   bool sheet = false;
-  std::string source;       ///< origin of the numbers
-  std::string uncertainty;  ///< known error of the numbers
+  std::string family;                    ///< kind of material, for lists; empty: none
+  std::string source;                    ///< origin of the numbers
+  std::optional<MaterialSpread> spread;  ///< known error of the numbers
+  std::string uncertainty;               ///< what else limits the numbers
 
   /// True if the temperature under the last layer is that of the interior of the body that the
   /// surface belongs to. base_k is then where it starts.
