@@ -17,7 +17,7 @@ libraries=(libepoxy-dev libegl-dev libglfw3-dev libglm-dev libtinygltf-dev libst
 runtime=(libegl-mesa0 libgl1-mesa-dri xvfb xauth)
 checkers=(clang-format clang-tidy clang libclang-rt-dev python3 tshark)
 yardsticks=(iperf3 libzmq3-dev iceoryx libiceoryx-posh-dev)
-peers=(gpsd-tools proj-bin)
+peers=(gpsd-tools proj-bin ffmpeg)
 node_peers=(@mcap/core@2 @mcap/support@1 protobufjs@7 open-dis@1 gps@0.9)
 peers_folder=${EMIT_PEERS_DIR:-${XDG_CACHE_HOME:-$HOME/.cache}/emit/peers}
 

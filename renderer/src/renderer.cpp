@@ -48,8 +48,8 @@ static_assert(EMIT_MAX_ATMOSPHERE_TERMS == limits::kMaxAtmosphereTerms);
 
 /// Alignment of storage blocks. GL guarantees that no driver asks for more.
 constexpr std::size_t kBlockAlignment = 256;
-/// Largest number of planes: radiance of all bands, temperature, depth, object.
-constexpr std::size_t kMaxPlanes = EMIT_MAX_BANDS + 3;
+/// Largest number of planes: radiance of all bands, temperature, depth, object, sun, sky.
+constexpr std::size_t kMaxPlanes = EMIT_MAX_BANDS + 5;
 
 /// Checks the limits of the renderer. Errors: config, naming the value and the limit.
 Result<void> check_limits(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
@@ -126,6 +126,9 @@ class GlRenderer final : public Renderer {
     return history_.environment.append(sample);
   }
   void reset() noexcept override;
+  void plan(std::span<const std::int64_t> thermal_times_ns) override {
+    stage_->plan(thermal_times_ns);
+  }
   Result<void> warm_up(const FrameRequest& first, const WarmUpProgress& progress) override;
   Result<void> carry_on(const FrameRequest& to, const WarmUpProgress& progress) override {
     EMIT_CHECK(warm_);
@@ -137,6 +140,12 @@ class GlRenderer final : public Renderer {
   void release(SlotIndex slot) noexcept override { readback_.release(slot); }
   std::span<const QualityLevelStats> expected_levels(const FrameRequest& request) noexcept override;
   physics::Pose scenario_sensor_pose_at(std::int64_t sim_time_ns) const noexcept override;
+  std::optional<std::uint32_t> nearest_sample(const SurfacePlace& place) const noexcept override {
+    return stage_->nearest_sample(place);
+  }
+  SampleReading sample_reading(std::uint32_t sample) const noexcept override {
+    return stage_->sample_reading(sample);
+  }
   const SceneStats& scene_stats() const noexcept override { return scene_stats_; }
   const std::string& device_name() const noexcept override { return context_.device_name(); }
 
@@ -222,7 +231,8 @@ RadianceContent radiance_content(const BandModel& bands, const OutputOptions& ou
           .terms = bands.max_terms(),
           .outputs = (output.temperature ? EMIT_OUTPUT_TEMPERATURE : 0U) |
                      (output.depth ? EMIT_OUTPUT_DEPTH : 0U) |
-                     (output.object ? EMIT_OUTPUT_OBJECT : 0U)};
+                     (output.object ? EMIT_OUTPUT_OBJECT : 0U) |
+                     (output.sun ? EMIT_OUTPUT_SUN : 0U) | (output.sky ? EMIT_OUTPUT_SKY : 0U)};
 }
 
 /// True when some object of the scenario is an entity.
@@ -234,7 +244,7 @@ bool has_entities(const scene::ScenarioDesc& scenario) {
 /// Number of planes of the output image.
 std::size_t plane_count(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
   return scenario.bands.size() + (output.temperature ? 1U : 0U) + (output.depth ? 1U : 0U) +
-         (output.object ? 1U : 0U);
+         (output.object ? 1U : 0U) + (output.sun ? 1U : 0U) + (output.sky ? 1U : 0U);
 }
 
 /// Size of all planes, rounded up to the alignment of a storage block.
@@ -311,6 +321,8 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
     if (output_.temperature) view.temperature_k = next_plane();
     if (output_.depth) view.depth_m = next_plane();
     if (output_.object) view.object_id = next_plane();
+    if (output_.sun) view.sun_cosine = next_plane();
+    if (output_.sky) view.sky_frac = next_plane();
   }
   glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
 }

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <limits>
 
 #include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
@@ -49,6 +51,7 @@ std::vector<RefineView::Eye> all_eyes(const scene::Trajectory& keys) {
   for (std::size_t i = 0; i < keys.size(); ++i) {
     eyes.push_back(eye_of(keys[i].pose));
     if (i + 1 == keys.size()) break;
+    if (keys[i + 1].teleport) continue;  // the camera stays until it jumps
     // Add positions between this key and the next.
     const std::int64_t length_ns = keys[i + 1].sim_time_ns - keys[i].sim_time_ns;
     for (std::size_t part = 1; part < kEyes; ++part) {
@@ -69,7 +72,11 @@ RefineView refine_view(const scene::SensorDesc& sensor, const FrameRequest& requ
   view.eyes.push_back(eye_of(request.sensor_pose));
   const scene::Trajectory& keys = sensor.trajectory;
   if (keys.size() < 2) return view;
-  // Add positions along the rest of the trajectory.
+  // Add the positions that the camera jumps to, and positions along the rest of the trajectory.
+  for (const scene::Keyframe& key : keys) {
+    if (key.teleport && key.sim_time_ns > request.sim_time_ns)
+      view.eyes.push_back(eye_of(key.pose));
+  }
   const std::int64_t end_ns = keys[keys.size() - 1].sim_time_ns;
   for (std::size_t i = 1; i <= kEyes && request.sim_time_ns < end_ns; ++i) {
     const auto way = static_cast<double>(end_ns - request.sim_time_ns) * static_cast<double>(i);
@@ -174,7 +181,13 @@ physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
                                            const WarmUpProgress& progress) {
   // Sample the surface for the camera and integrate its history, or read the state file.
   const CachedSurface::Inputs inputs{history_.environment, history_.entities, history_.parts};
-  const RefineView view = refine_view(sensor_, request);
+  RefineView view = refine_view(sensor_, request);
+  for (const std::int64_t at_ns : planned_ns_) {
+    const physics::SunPosition sun = history_.environment.sun_at(at_ns);
+    if (at_ns > request.thermal_time_ns && sun.elevation.value() > StepPlan::kMinSunElevationRad) {
+      view.coming_suns.push_back(sun.direction_enu);
+    }
+  }
   if (saved_) {
     const RefineView::Eye here = view.eyes.front();
     saved_->fits_camera = [this, here](std::span<const RefineView::Eye> eyes) {
@@ -250,6 +263,49 @@ void CachedStage::describe(SceneStats& stats) const noexcept {
   stats.coarse_meshes = visibly_simplified_;
 }
 
+physics::Pose CachedStage::frame_of(const SurfaceSample& sample) const noexcept {
+  if (sample.entity < 0) return {surface_->origin_world_m(), glm::dquat(1.0, 0.0, 0.0, 0.0)};
+  return history_.entities[static_cast<std::size_t>(sample.entity)].at(drawn_ns_).pose;
+}
+
+std::optional<std::uint32_t> CachedStage::nearest_sample(const SurfacePlace& place) const noexcept {
+  if (drawn_ == nullptr) return std::nullopt;
+  const double same_way = std::cos(30.0 * physics::kDegree);
+  const SurfaceModel& model = surface_->model();
+  std::optional<std::uint32_t> nearest;
+  double nearest_m = std::numeric_limits<double>::infinity();
+  // Bring the place into the frame of the samples, which changes only between entities.
+  std::int32_t entity = std::numeric_limits<std::int32_t>::min();
+  glm::dvec3 position_m{0.0};
+  glm::dvec3 normal{0.0};
+  for (std::uint32_t i = 0; i < model.drawn_samples; ++i) {
+    const SurfaceSample& sample = model.samples.samples[i];
+    if (sample.entity != entity) {
+      entity = sample.entity;
+      const physics::Pose frame = frame_of(sample);
+      const glm::dquat frame_from_world = glm::conjugate(frame.world_from_body);
+      position_m = frame_from_world * (place.position_world_m - frame.position_world_m);
+      normal = frame_from_world * place.normal;
+    }
+    if (glm::dot(glm::dvec3(sample.normal), normal) < same_way) continue;
+    const double away_m = glm::distance(glm::dvec3(sample.position_m), position_m);
+    if (away_m >= nearest_m) continue;
+    nearest_m = away_m;
+    nearest = i;
+  }
+  return nearest;
+}
+
+SampleReading CachedStage::sample_reading(std::uint32_t sample) const noexcept {
+  EMIT_CHECK_OP(sample, <, surface_->model().drawn_samples);
+  const SurfaceSample& each = surface_->model().samples.samples[sample];
+  const SampleOutput output = surface_->output_now(sample);
+  const physics::Pose frame = frame_of(each);
+  return {frame.position_world_m + frame.world_from_body * glm::dvec3(each.position_m),
+          physics::kReferenceK + static_cast<double>(output.offset_k),
+          surface_->flux_now_w_m2(sample)};
+}
+
 void CachedStage::prepare(const FrameRequest& request, CameraSetup& camera,
                           gpu::FrameParams& frame) noexcept {
   const CachedSurface::Inputs inputs{history_.environment, history_.entities, history_.parts};
@@ -261,6 +317,7 @@ void CachedStage::prepare(const FrameRequest& request, CameraSetup& camera,
     shade_pass_->prepare(*surface_, request.sensor_pose.position_world_m, camera, frame);
   }
   // Store the position between the two nodes, and sun and weather.
+  drawn_ns_ = request.sim_time_ns;
   frame.node_frac = surface_->fraction();
   sun_now_ = history_.environment.sun_at(request.thermal_time_ns);
   forcing_now_ = history_.environment.forcing_at(request.thermal_time_ns, sun_now_);

@@ -23,6 +23,9 @@ class CachedStage final : public ThermalStage {
       const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
       std::vector<FosterMaterial> foster_materials, const SceneHistory& history, bool software);
 
+  void plan(std::span<const std::int64_t> thermal_times_ns) override {
+    planned_ns_.assign(thermal_times_ns.begin(), thermal_times_ns.end());
+  }
   physics::Result<void> warm_up(const FrameRequest& request,
                                 const WarmUpProgress& progress) override;
   physics::Result<void> carry_on(const FrameRequest& to, const WarmUpProgress& progress) override;
@@ -32,6 +35,8 @@ class CachedStage final : public ThermalStage {
   DrawnScene& drawn() noexcept override;
   void describe(SceneStats& stats) const noexcept override;
   bool coarse_from(const physics::Pose& camera) const noexcept override;
+  std::optional<std::uint32_t> nearest_sample(const SurfacePlace& place) const noexcept override;
+  SampleReading sample_reading(std::uint32_t sample) const noexcept override;
   void prepare(const FrameRequest& request, CameraSetup& camera,
                gpu::FrameParams& frame) noexcept override;
   const physics::SunPosition& sun_now() const noexcept override { return sun_now_; }
@@ -54,6 +59,9 @@ class CachedStage final : public ThermalStage {
   static bool stands_near(const std::vector<Eye>& eyes, const RefineView::Eye& here,
                           double cos_at_least) noexcept;
 
+  /// Transform to the world of the frame that a sample's coordinates are in, at the latest frame.
+  [[nodiscard]] physics::Pose frame_of(const SurfaceSample& sample) const noexcept;
+
   CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb& static_bounds,
               std::vector<Eye> detail_eyes, std::unique_ptr<CachedSurface> surface,
               std::vector<FosterMaterial> foster_materials, const SceneHistory& history,
@@ -73,9 +81,11 @@ class CachedStage final : public ThermalStage {
   SurfaceHistory surface_history_;
   std::unique_ptr<CachedSurface> surface_;
   std::optional<SavedSurface> saved_;
-  std::unique_ptr<DrawnScene> drawn_;  ///< null before the first warm_up()
+  std::vector<std::int64_t> planned_ns_;  ///< thermal instants of frames to come
+  std::unique_ptr<DrawnScene> drawn_;     ///< null before the first warm_up()
   physics::SunPosition sun_now_;
   physics::Forcing forcing_now_;
+  std::int64_t drawn_ns_ = 0;  ///< simulation time of the latest frame, of its entities
 
   std::array<gl::Buffer, 3> node_buffers_;  ///< one per storage of CachedSurface
   std::optional<ShadePass> shade_pass_;     ///< empty when the scenario has no entities

@@ -2,6 +2,7 @@
 #pragma once
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "emit/physics/constants.hpp"
@@ -53,6 +54,8 @@ class ThermalStage {
   ThermalStage& operator=(const ThermalStage&) = delete;
   virtual ~ThermalStage() = default;
 
+  /// Implements Renderer::plan(). A method whose frames do not depend on a warm-up ignores it.
+  virtual void plan(std::span<const std::int64_t> /*thermal_times_ns*/) {}
   /// Does the work that frames from `request` on need once. Errors: those of Renderer::warm_up().
   virtual physics::Result<void> warm_up(const FrameRequest& request,
                                         const WarmUpProgress& progress) = 0;
@@ -69,6 +72,16 @@ class ThermalStage {
   [[nodiscard]] virtual DrawnScene& drawn() noexcept = 0;
   /// Adds the figures of the method to the statistics of the scene.
   virtual void describe(SceneStats&) const noexcept {}
+
+  /// Implements Renderer::nearest_sample(). A method without samples finds none.
+  [[nodiscard]] virtual std::optional<std::uint32_t> nearest_sample(
+      const SurfacePlace& /*place*/) const noexcept {
+    return std::nullopt;
+  }
+  /// Implements Renderer::sample_reading().
+  [[nodiscard]] virtual SampleReading sample_reading(std::uint32_t /*sample*/) const noexcept {
+    return {};
+  }
 
   /// True when the surface was not prepared for a camera at this pose, so that the image may be
   /// coarser than asked.

@@ -21,11 +21,12 @@ const Clock& system_clock() {
   return clock;
 }
 
-Progress::Output standard_error() {
-  return {::isatty(STDERR_FILENO) == 1, [](std::string_view text) {
-            std::fwrite(text.data(), 1, text.size(), stderr);
-            std::fflush(stderr);
-          }};
+Progress::Write standard_error() {
+  if (::isatty(STDERR_FILENO) != 1) return {};
+  return [](std::string_view text) {
+    std::fwrite(text.data(), 1, text.size(), stderr);
+    std::fflush(stderr);
+  };
 }
 
 }  // namespace
@@ -64,11 +65,11 @@ std::string progress_text(std::string_view label, const ProgressMeter::Report& r
 Progress::Progress(std::string label, std::uint64_t total)
     : Progress(std::move(label), total, system_clock(), standard_error()) {}
 
-Progress::Progress(std::string label, std::uint64_t total, const Clock& clock, Output output)
+Progress::Progress(std::string label, std::uint64_t total, const Clock& clock, Write write)
     : label_(std::move(label)),
       total_(std::max<std::uint64_t>(total, 1)),
       clock_(&clock),
-      output_(std::move(output)),
+      write_(std::move(write)),
       meter_(clock) {}
 
 Progress::~Progress() {
@@ -78,42 +79,30 @@ Progress::~Progress() {
 void Progress::draw_bar(const ProgressMeter::Report& report) {
   constexpr std::size_t kWidth = 30;
   const std::size_t filled = kWidth * static_cast<std::size_t>(report.done_percent) / 100;
-  output_.write(fmt::format(
+  write_(fmt::format(
       "\r{} [{}{}] {} %{}\x1b[K", label_, std::string(filled, '#'),
       std::string(kWidth - filled, '.'), report.done_percent,
       report.left_s ? fmt::format(", about {} left", duration_text(*report.left_s)) : ""));
 }
 
 void Progress::advance_to(std::uint64_t done) {
-  if (finished_) return;
-  const double done_frac =
-      static_cast<double>(std::min(done, total_)) / static_cast<double>(total_);
-  const bool complete = done >= total_;
-  if (output_.terminal) {
-    const std::int64_t now_ns = clock_->monotonic_ns();
-    if (!complete && drawn_ns_ && now_ns - *drawn_ns_ < kDrawEveryNs) return;
-    drawn_ns_ = now_ns;
-    draw_bar(meter_.report(done_frac));
-    return;
-  }
-  if (complete) {
-    finished_ = true;
-    if (lines_written_) {
-      const ProgressMeter::Report report = meter_.report(1.0);
-      output_.write(fmt::format("{} done after {}\n", label_, duration_text(report.elapsed_s)));
-    }
-    return;
-  }
-  if (const auto report = meter_.due(done_frac)) {
-    lines_written_ = true;
-    output_.write(progress_text(label_, *report) + "\n");
-  }
+  if (finished_ || !write_) return;
+  const std::int64_t now_ns = clock_->monotonic_ns();
+  if (done < total_ && drawn_ns_ && now_ns - *drawn_ns_ < kDrawEveryNs) return;
+  drawn_ns_ = now_ns;
+  draw_bar(
+      meter_.report(static_cast<double>(std::min(done, total_)) / static_cast<double>(total_)));
+}
+
+void Progress::clear() {
+  if (drawn_ns_) write_("\r\x1b[K");
+  drawn_ns_.reset();
 }
 
 void Progress::finish() {
   if (finished_) return;
   finished_ = true;
-  if (drawn_ns_) output_.write("\r\x1b[K");
+  clear();
 }
 
 }  // namespace emit::server

@@ -44,25 +44,23 @@ class ProgressMeter {
 [[nodiscard]] std::string progress_text(std::string_view label,
                                         const ProgressMeter::Report& report);
 
-/// Progress of a long work on standard error. On a terminal it is a bar, which is drawn up to ten
-/// times a second and cleared at the end. Elsewhere it is a line every few seconds, as
-/// ProgressMeter says, and a line at the end when there was one before. Thread: one owner.
+/// Bar of a long work on standard error: share done and time left, up to ten times a second. It is
+/// cleared at the end. Where standard error is no terminal nothing is written. Thread: one owner.
 class Progress {
  public:
-  struct Output {
-    bool terminal = false;
-    std::function<void(std::string_view text)> write;
-  };
+  using Write = std::function<void(std::string_view text)>;
 
   /// Writes to standard error by the system's clock. The work has `total` parts; 0 counts as 1.
   Progress(std::string label, std::uint64_t total);
-  /// `clock` outlives the object.
-  Progress(std::string label, std::uint64_t total, const Clock& clock, Output output);
+  /// `write` gets what the terminal shall show; empty: no terminal. `clock` outlives the object.
+  Progress(std::string label, std::uint64_t total, const Clock& clock, Write write);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
   void advance_to(std::uint64_t done);
+  /// Takes the bar away, so that the caller can write lines. The next advance_to() draws it again.
+  void clear();
   /// Clears the bar; called by the destructor too. Later calls do nothing.
   void finish();
 
@@ -72,10 +70,9 @@ class Progress {
   std::string label_;
   std::uint64_t total_;
   const Clock* clock_;
-  Output output_;
+  Write write_;  ///< empty: nothing is shown
   ProgressMeter meter_;
-  std::optional<std::int64_t> drawn_ns_;
-  bool lines_written_ = false;
+  std::optional<std::int64_t> drawn_ns_;  ///< none: no bar is on the terminal
   bool finished_ = false;
 };
 

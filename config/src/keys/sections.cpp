@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "campaign_keys.hpp"
 #include "emit/config/load.hpp"
 #include "keys.hpp"
 
@@ -175,6 +176,8 @@ std::string key_reference_markdown() {
   append_sections(scenario_sections(), out);
   out += "## Daemon keys\n\n";
   append_sections(daemon_sections(), out);
+  out += "## Campaign keys\n\nFiles of `emit campaign`.\n\n";
+  append_sections(campaign_sections(), out);
   out.pop_back();
   return out;
 }

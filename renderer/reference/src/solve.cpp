@@ -530,39 +530,20 @@ Result<SolvedImage> SceneSolver::image(const SolveView& view) {
 std::optional<PixelHit> SceneSolver::Data::surface_at(const SceneInstant& instant,
                                                       const SolveProbe& probe,
                                                       ProbedPoint& out) const {
-  std::vector<glm::dvec3> from;
-  if (probe.normal) {
-    from.push_back(glm::normalize(*probe.normal));
-  } else {
-    for (const double x : {0.0, -1.0, 1.0}) {
-      for (const double y : {0.0, -1.0, 1.0}) {
-        for (const double z : {1.0, -1.0, 0.0}) {
-          if (x != 0.0 || y != 0.0 || z != 0.0) from.push_back(glm::normalize(glm::dvec3(x, y, z)));
-        }
-      }
-    }
-  }
-  std::optional<PixelHit> best;
-  double nearest_m = kProbeReachM;
-  for (const glm::dvec3& outwards : from) {
-    const auto hit =
-        instant.first_hit({probe.position_m + kProbeReachM * outwards, -outwards, 0.0});
-    if (!hit) continue;
-    if (!probe.object.empty() && scenario.objects[hit->object].name != probe.object) continue;
-    const double away_m = glm::distance(hit->position_world_m, probe.position_m);
-    if (away_m >= nearest_m) continue;
-    nearest_m = away_m;
-    PixelHit p;
-    glm::dvec3 normal = solid ? hit->geometric_normal : hit->shading_normal;
-    if (glm::dot(normal, hit->geometric_normal) <= 0.0) normal = hit->geometric_normal;
-    if (!hit->front) normal = -normal;
-    p.point = {hit->position_world_m, normal, hit->material, hit->entity};
-    out.position_m = hit->position_world_m;
-    out.normal = normal;
-    out.object = hit->object;
-    best = p;
-  }
-  return best;
+  const auto hit =
+      nearest_surface(instant, probe.position_m, probe.normal, [&](const RayHit& candidate) {
+        return probe.object.empty() || scenario.objects[candidate.object].name == probe.object;
+      });
+  if (!hit) return std::nullopt;
+  glm::dvec3 normal = solid ? hit->geometric_normal : hit->shading_normal;
+  if (glm::dot(normal, hit->geometric_normal) <= 0.0) normal = hit->geometric_normal;
+  if (!hit->front) normal = -normal;
+  out.position_m = hit->position_world_m;
+  out.normal = normal;
+  out.object = hit->object;
+  PixelHit p;
+  p.point = {hit->position_world_m, normal, hit->material, hit->entity};
+  return p;
 }
 
 Result<std::vector<ProbedPoint>> SceneSolver::probe(std::span<const SolveProbe> probes,

@@ -199,6 +199,12 @@ void write_pixel(ivec2 px) {
   if ((EMIT_OUTPUTS & EMIT_OUTPUT_OBJECT) != 0u) {
     planes[plane++ * plane_px + pixel] = surface ? float(seen.object) : 0.0;
   }
+  if ((EMIT_OUTPUTS & EMIT_OUTPUT_SUN) != 0u) {
+    planes[plane++ * plane_px + pixel] = surface ? seen.sun_cosine : uintBitsToFloat(0x7fc00000u);
+  }
+  if ((EMIT_OUTPUTS & EMIT_OUTPUT_SKY) != 0u) {
+    planes[plane++ * plane_px + pixel] = surface ? seen.open_frac : uintBitsToFloat(0x7fc00000u);
+  }
   // Count the pixel if it is flagged.
   int flags = (nonfinite ? EMIT_FLAG_NONFINITE : 0) + (clamped ? EMIT_FLAG_CLAMPED : 0);
   if (flags != 0) atomicAdd(stats.flagged_px[flags], 1u);

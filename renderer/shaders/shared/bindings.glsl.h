@@ -68,6 +68,8 @@
 #define EMIT_OUTPUT_TEMPERATURE 1u
 #define EMIT_OUTPUT_DEPTH 2u
 #define EMIT_OUTPUT_OBJECT 4u
+#define EMIT_OUTPUT_SUN 8u
+#define EMIT_OUTPUT_SKY 16u
 
 // Indices of FrameStatsGpu.flagged_px.
 #define EMIT_FLAG_NONFINITE 1

@@ -3,8 +3,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <glm/geometric.hpp>
+#include <limits>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
 
 namespace emit::renderer {
@@ -171,6 +174,16 @@ SampleOutput FosterHeat::output(const SurfaceSample& sample, const glm::vec3& no
                                 const SampleState& state) const noexcept {
   const Incoming in = incoming(sample, normal, forcing, drive, drive.longwave_begin_w_m2);
   return output_of(sample, in, drive, offset_k(sample.material, state));
+}
+
+void FosterHeat::show_state(std::uint32_t material, const SampleState& state,
+                            SampleOutput& output) const noexcept {
+  const double before_k = reference_k_ + static_cast<double>(output.offset_k);
+  const double offset_k = this->offset_k(material, state);
+  output.offset_k = static_cast<float>(offset_k);
+  output.longwave_out_w_m2 +=
+      static_cast<float>(materials_[material].emissivity_frac *
+                         (exitance_w_m2(reference_k_ + offset_k) - exitance_w_m2(before_k)));
 }
 
 void FosterHeat::begin_column(const SurfaceSample& sample, SampleState& state) const noexcept {
@@ -357,6 +370,27 @@ double FosterHeat::into_base_w_m2(std::uint32_t material, const SampleState& sta
                  (state.modes_k[i] + m.base_shares[i] * base_k);
   }
   return flux_w_m2;
+}
+
+double FosterHeat::mean_flux_w_m2(const SurfaceSample& sample, const SampleState& begin,
+                                  double begin_base_offset_k, const SampleState& end,
+                                  double end_base_offset_k, double dt_s) const noexcept {
+  EMIT_CHECK_OP(dt_s, >, 0.0);
+  const FosterMaterial& m = materials_[sample.material];
+  if (m.prescribed()) return std::numeric_limits<double>::quiet_NaN();
+  // Take the slowest mode that the surface drives. At the foot of a solid the slow ones are cut.
+  constexpr float kOpen = 0.5F;
+  std::size_t i = m.network.count - 1;
+  while (i > 0 && sample.open_frac[i] < kOpen) --i;
+  if (sample.covered || !(sample.open_frac[i] > 0.0F)) return 0.0;
+  // Solve eq. 17 for the constant flux that leads from one state to the other. States count from
+  // the base of the material, modes from the base of the sample.
+  const double own_base_k = surfaces_[sample.material].base_offset_k;
+  const double begin_k = begin.modes_k[i] - m.base_shares[i] * (begin_base_offset_k - own_base_k);
+  const double end_k = end.modes_k[i] - m.base_shares[i] * (end_base_offset_k - own_base_k);
+  const double decay = -std::expm1(-dt_s / m.network.modes[i].tau_s);
+  return (end_k - begin_k + decay * begin_k) /
+         (sample.open_frac[i] * m.network.modes[i].resistance_m2k_w * decay);
 }
 
 double FosterHeat::count_from_body(const SampleAdvance& each, double sign) const noexcept {

@@ -71,6 +71,15 @@ class FosterHeat {
   [[nodiscard]] double into_base_w_m2(std::uint32_t material,
                                       const SampleState& state) const noexcept;
 
+  /// Returns the mean flux into the solid over an interval of `dt_s` between two states of a
+  /// sample, from its slowest mode, which weighs the interval evenly. The base of either state is
+  /// `base_offset_k` (the interior of the sample's body, or base_offset_k() of its material). NaN
+  /// where no flux drives the state: with prescribed temperatures.
+  /// @pre dt_s > 0
+  [[nodiscard]] double mean_flux_w_m2(const SurfaceSample& sample, const SampleState& begin,
+                                      double begin_base_offset_k, const SampleState& end,
+                                      double end_base_offset_k, double dt_s) const noexcept;
+
   /// Cells of the stacks of a material; none where heat moves straight down alone: in sheets and in
   /// prescribed temperatures.
   [[nodiscard]] const physics::ColumnCells& cells(std::uint32_t material) const noexcept {
@@ -88,6 +97,10 @@ class FosterHeat {
   SampleOutput output(const SurfaceSample& sample, const glm::vec3& normal,
                       const SurfaceForcing& forcing, const SampleDrive& drive,
                       const SampleState& state) const noexcept;
+
+  /// Brings an output up to a state whose cells have changed since.
+  void show_state(std::uint32_t material, const SampleState& state,
+                  SampleOutput& output) const noexcept;
 
   /// Computes the step response of a material; see SampleHeat::step_response().
   void step_response(std::uint32_t material, const ResponseConditions& around,

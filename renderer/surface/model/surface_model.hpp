@@ -29,6 +29,9 @@ struct RefineView {
   double pixel_rad = 1e-3;  ///< angle of a pixel
   /// Angle around a boresight in which surfaces are refined first. The default is all around.
   double field_rad = 3.1416;
+  /// Directions to the sun at instants of later frames, unit length, world axes. Edges of shadows
+  /// that static geometry will cast then are places to refine too.
+  std::vector<glm::dvec3> coming_suns{};
 };
 
 /// Options of build_surface_model(), from the scenario.

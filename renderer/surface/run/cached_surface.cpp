@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "surface/run/weather_change.hpp"
@@ -154,7 +155,6 @@ physics::Result<void> CachedSurface::carry_on(std::int64_t now_ns, const Inputs&
 
 void CachedSurface::begin_first_interval(std::int64_t start_ns, const Inputs& inputs,
                                          const StepPlan& plan, SurfaceHistory& history) {
-  const std::size_t count = model_->samples.samples.size();
   // Move the states of the model into node 0.
   nodes_.begin(std::move(model_->states), std::move(model_->outputs), model_->drawn_samples,
                model_->body_k);
@@ -189,8 +189,7 @@ void CachedSurface::begin_first_interval(std::int64_t start_ns, const Inputs& in
   }
   // Compute node 1.
   begin_anew(0, inputs, history);
-  interval_.compute(nodes_[0], nodes_[1], static_cast<std::uint32_t>(count), model_->samples,
-                    nullptr, workers_);
+  interval_.finish(nodes_[0], nodes_[1], model_->samples, nullptr, workers_);
 }
 
 void CachedSurface::fill_first_vertices() {
@@ -256,16 +255,22 @@ void CachedSurface::begin_next(std::int64_t from_ns, const Inputs& inputs,
   shares_ = {from_ns, nodes_[1].at_ns};
 }
 
-void CachedSurface::compute(std::uint32_t end) noexcept {
+void CachedSurface::compute(double passed_frac) noexcept {
   // Leave blocks that LocalSteps steps to it during a renewal.
   const std::size_t node = renewing_ ? 0 : 1;
-  interval_.compute(nodes_[node], nodes_[node + 1], end, model_->samples,
+  interval_.compute(nodes_[node], nodes_[node + 1], passed_frac, model_->samples,
                     renewing_ ? &*local_ : nullptr, workers_);
+}
+
+void CachedSurface::finish() noexcept {
+  const std::size_t node = renewing_ ? 0 : 1;
+  interval_.finish(nodes_[node], nodes_[node + 1], model_->samples, renewing_ ? &*local_ : nullptr,
+                   workers_);
 }
 
 void CachedSurface::end_interval(const Inputs& inputs, SurfaceHistory& history) noexcept {
   local_->rotate(window(), model_->samples);
-  compute(static_cast<std::uint32_t>(model_->samples.samples.size()));
+  finish();
   nodes_.rotate();
   local_->rotated(window(), model_->samples);
   nodes_[2].changes.clear();
@@ -300,7 +305,7 @@ void CachedSurface::begin_renewal(std::int64_t event_ns, std::int64_t now_ns, co
 void CachedSurface::end_renewal(std::int64_t now_ns, const Inputs& inputs,
                                 SurfaceHistory& history) noexcept {
   // Compute the rest of node 1, then begin node 2 anew from there.
-  compute(static_cast<std::uint32_t>(model_->samples.samples.size()));
+  finish();
   renewing_ = false;
   lags_ = misses_weather(now_ns, inputs);
   nodes_[2].changes.clear();
@@ -370,10 +375,9 @@ void CachedSurface::advance(std::int64_t now_ns, const Inputs& inputs,
   // Continue with node 1 while sim time stands still.
   if (renewing_ && now_ns == last_now_ns_) shares_.move_back(kHeldFrames);
   last_now_ns_ = now_ns;
-  // Compute the share of the samples that the passed time asks for.
-  const std::size_t count = model_->samples.samples.size();
-  compute(shares_.samples_at(now_ns, count));
-  if (renewing_ && interval_.done() == count) end_renewal(now_ns, inputs, history);
+  // Do the share of the work that the passed time asks for.
+  compute(shares_.passed_frac(now_ns));
+  if (renewing_ && interval_.finished()) end_renewal(now_ns, inputs, history);
 }
 
 void CachedSurface::place_shadows(std::int64_t drawn_ns, std::int64_t sun_ns,
@@ -387,9 +391,28 @@ void CachedSurface::forget_changes() noexcept {
   nodes_.forget_changes();
 }
 
+double CachedSurface::flux_now_w_m2(std::uint32_t sample) const noexcept {
+  const FosterHeat* foster = heat_.foster();
+  const SurfaceNode& begin = nodes_[0];
+  const SurfaceNode& end = nodes_[1];
+  if (foster == nullptr || end.at_ns <= begin.at_ns)
+    return std::numeric_limits<double>::quiet_NaN();
+  // Read the front of a sheet: both faces share its state.
+  const SurfaceSamples& all = model().samples;
+  const std::uint32_t own = steps_itself(all, sample) ? sample : all.samples[sample].other_side;
+  const SurfaceSample& read = all.samples[own];
+  const auto base_offset_k = [&](const SurfaceNode& node) {
+    return read.body >= 0 ? node.body_k[static_cast<std::size_t>(read.body)]
+                          : foster->base_offset_k(read.material);
+  };
+  return foster->mean_flux_w_m2(read, begin.states[own], base_offset_k(begin), end.states[own],
+                                base_offset_k(end),
+                                1e-9 * static_cast<double>(end.at_ns - begin.at_ns));
+}
+
 std::uint64_t CachedSurface::sample_bytes() const noexcept {
   const auto bytes = [](const auto& values) { return values.capacity() * sizeof(values[0]); };
-  std::uint64_t sum = nodes_.bytes();
+  std::uint64_t sum = nodes_.bytes() + interval_.bytes();
   if (model_)
     sum += bytes(model_->samples.samples) + bytes(model_->samples.seen) +
            bytes(model_->samples.columns) + bytes(model_->samples.links);

@@ -143,6 +143,14 @@ class CachedSurface {
     EMIT_CHECK(model_.has_value());
     return *model_;
   }
+  /// Output of a sample at the time of the latest advance(). @pre prepare(); sample < samples
+  [[nodiscard]] SampleOutput output_now(std::uint32_t sample) const noexcept {
+    return between(nodes_[0].outputs[sample], nodes_[1].outputs[sample], fraction_);
+  }
+  /// Mean net flux into the solid at a sample, W/m2, over the interval of the latest advance(). NaN
+  /// where no flux drives the heat: with emit2014 and prescribed temperatures.
+  /// @pre prepare(); sample < samples
+  [[nodiscard]] double flux_now_w_m2(std::uint32_t sample) const noexcept;
   /// Main memory of the samples in bytes, without the meshes between them.
   [[nodiscard]] std::uint64_t sample_bytes() const noexcept;
   /// Takes the refined meshes as a scene whose instances are grouped by mesh. Their levels of
@@ -173,9 +181,11 @@ class CachedSurface {
   void begin_anew(std::size_t node, const Inputs& inputs, SurfaceHistory& history) noexcept;
   /// Begins the interval after node 1, whose samples are computed from `from_ns` to node 1.
   void begin_next(std::int64_t from_ns, const Inputs& inputs, SurfaceHistory& history) noexcept;
-  /// Computes the samples up to `end`, from node 1 to node 2, or from node 0 to node 1 in a
-  /// renewal.
-  void compute(std::uint32_t end) noexcept;
+  /// Does the work that is due when `passed_frac` of its time has passed, from node 1 to node 2, or
+  /// from node 0 to node 1 in a renewal.
+  void compute(double passed_frac) noexcept;
+  /// Does all of it.
+  void finish() noexcept;
   /// Finishes node 2, and makes the interval that ends there the current one.
   void end_interval(const Inputs& inputs, SurfaceHistory& history) noexcept;
 
@@ -197,13 +207,10 @@ class CachedSurface {
   /// Does the steps of LocalSteps that are due up to `until_ns`.
   void run_local(std::int64_t until_ns, const Inputs& inputs, SurfaceHistory& history) noexcept;
   [[nodiscard]] LocalSteps::Window window() noexcept {
-    return {nodes_[0],
-            nodes_[1],
-            nodes_[2],
-            renewing_ ? 0U : interval_.done(),
-            renewing_,
-            interval_.rays(),
-            interval_.heat_interval()};
+    return {nodes_[0],        nodes_[1],
+            nodes_[2],        renewing_ ? 0U : interval_.done(),
+            renewing_,        interval_.stepped_again(),
+            interval_.rays(), interval_.heat_interval()};
   }
 
   SurfaceGeometry geometry_;

@@ -374,6 +374,8 @@ void LocalSteps::hand_back(std::span<const std::uint32_t> blocks, std::int64_t a
        [&](std::uint32_t i, const SampleState& state, const SampleOutput& output) {
          window.next.states[i] = state;
          window.next.outputs[i] = output;
+         const std::uint32_t column = inputs.step.all.samples[i].column;
+         if (column != kNoSample) window.stepped_again[column] = 1;
          if (i >= window.next.vertices.size()) return;
          window.next.vertices[i] = {output.offset_k, output.sun_frac};
          window.next.changes.add(i, 1);

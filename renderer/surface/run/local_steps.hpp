@@ -67,6 +67,8 @@ class LocalSteps {
     /// The flag is true while `after` is being computed anew: then values between it and `before`
     /// do not hold.
     bool renewing = false;
+    /// Flags by column, to be set for samples of `next` that are stepped again.
+    std::span<std::uint8_t> stepped_again;
     const IntervalRays& next_rays;
     const HeatInterval& next_interval;
   };

@@ -3,17 +3,32 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <limits>
 #include <utility>
 
 #include "emit/physics/check.hpp"
 
 namespace emit::renderer {
 
-std::uint32_t FrameShares::samples_at(std::int64_t now_ns, std::size_t count) const noexcept {
+namespace {
+
+/// Share of the time in which samples advance, if there are columns whose heat is found afterwards,
+/// and the share at which that is usually done.
+constexpr double kSamplesFrac = 0.5;
+constexpr double kColumnsFrac = 0.9;
+
+/// Returns the part of `count` that is due.
+std::size_t due(double passed_frac, std::size_t count) noexcept {
+  return static_cast<std::size_t>(
+      std::ceil(std::clamp(passed_frac, 0.0, 1.0) * static_cast<double>(count)));
+}
+
+}  // namespace
+
+double FrameShares::passed_frac(std::int64_t now_ns) const noexcept {
   const auto length_ns = static_cast<double>(std::max<std::int64_t>(1, end_ns - begin_ns));
-  const double gone_frac = static_cast<double>(now_ns - begin_ns) / length_ns;
-  return static_cast<std::uint32_t>(
-      std::ceil(std::clamp(gone_frac, 0.0, 1.0) * static_cast<double>(count)));
+  return std::clamp(static_cast<double>(now_ns - begin_ns) / length_ns, 0.0, 1.0);
 }
 
 void FrameShares::move_back(std::int64_t frames) noexcept {
@@ -34,7 +49,9 @@ void SurfaceInterval::reset(const SurfaceModel& model, std::vector<EntityAnchor>
                             bool exchange, std::uint32_t turn) {
   turn_ = turn;
   rays_.anchor(std::move(anchors));
+  count_ = static_cast<std::uint32_t>(model.samples.samples.size());
   done_ = 0;
+  columns_.emplace(model.samples, heat_);
   exitance_ = {};
   views_ = {};
   faces_.clear();
@@ -74,15 +91,43 @@ void SurfaceInterval::begin(const SurfaceNode& from, SurfaceNode& to, const Surf
     body_mean_k_[b] = course.mean_k;
   }
   done_ = 0;
+  columns_->begin(forcing.dt_s);
 }
 
-void SurfaceInterval::compute(const SurfaceNode& from, SurfaceNode& to, std::uint32_t end,
+void SurfaceInterval::compute(const SurfaceNode& from, SurfaceNode& to, double passed_frac,
                               const SurfaceSamples& all, const LocalSteps* skipped,
                               threads::WorkerPool& workers) noexcept {
+  const bool alone = columns_->columns() == 0;
+  advance_samples(
+      from, to, static_cast<std::uint32_t>(due(passed_frac / (alone ? 1.0 : kSamplesFrac), count_)),
+      all, skipped, workers);
+  if (alone || done_ < count_ || columns_->finished()) return;
+  // Begin the solution in a frame of its own, and continue at an even rate.
+  if (!columns_->started()) {
+    columns_->start(from, [&](std::uint32_t sample) {
+      return skipped != nullptr && skipped->has_own_clock(sample);
+    });
+    return;
+  }
+  const std::size_t until = due((passed_frac - kSamplesFrac) / (kColumnsFrac - kSamplesFrac),
+                                ColumnSolve::kUsualPasses * columns_->columns());
+  if (until > columns_->worked()) columns_->work(until - columns_->worked(), to, workers);
+}
+
+void SurfaceInterval::finish(const SurfaceNode& from, SurfaceNode& to, const SurfaceSamples& all,
+                             const LocalSteps* skipped, threads::WorkerPool& workers) noexcept {
+  compute(from, to, 1.0, all, skipped, workers);
+  if (!finished()) columns_->work(std::numeric_limits<std::size_t>::max(), to, workers);
+}
+
+void SurfaceInterval::advance_samples(const SurfaceNode& from, SurfaceNode& to, std::uint32_t end,
+                                      const SurfaceSamples& all, const LocalSteps* skipped,
+                                      threads::WorkerPool& workers) noexcept {
   EMIT_CHECK_OP(end, <=, to.states.size());
   const std::uint32_t first = done_;
   if (end <= first) return;
-  const SurfaceStep step = this->step(all);
+  SurfaceStep step = this->step(all);
+  step.columns = &*columns_;
   const auto keep = [&to](std::size_t i, const SampleState& state, const SampleOutput& output) {
     to.states[i] = state;
     to.outputs[i] = output;

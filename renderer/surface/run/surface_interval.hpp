@@ -2,6 +2,8 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "history/surface_history.hpp"
@@ -12,6 +14,7 @@
 #include "surface/model/entity_exitance.hpp"
 #include "surface/model/surface_model.hpp"
 #include "surface/rays/interval_rays.hpp"
+#include "surface/run/column_solve.hpp"
 #include "surface/run/local_steps.hpp"
 #include "surface/run/surface_geometry.hpp"
 #include "surface/run/surface_step.hpp"
@@ -20,20 +23,20 @@
 
 namespace emit::renderer {
 
-/// Time in which the samples of an interval are computed, a share of them in each frame.
+/// Time in which the work of an interval is done, a share of it in each frame.
 struct FrameShares {
   std::int64_t begin_ns = 0;
   std::int64_t end_ns = 0;
 
-  /// Returns how many of `count` samples are to be computed by `now_ns`. RT-safe.
-  [[nodiscard]] std::uint32_t samples_at(std::int64_t now_ns, std::size_t count) const noexcept;
+  /// Returns how much of the time has passed by `now_ns`, 0 to 1. RT-safe.
+  [[nodiscard]] double passed_frac(std::int64_t now_ns) const noexcept;
   /// Moves the time back by 1/`frames` of its length. The work then goes on while sim time stands
   /// still. RT-safe.
   void move_back(std::int64_t frames) noexcept;
 };
 
 /// The interval that is being computed: its forcing, gains, rays and the radiation of entities, and
-/// how many of the samples are at its end.
+/// how much of the work is done.
 ///
 /// Owner: CachedSurface. Thread: the renderer's; compute() uses all cores. Real time: everything
 /// but the constructor and reset() is RT-safe.
@@ -53,16 +56,30 @@ class SurfaceInterval {
   /// `history` to the end of the interval.
   void begin(const SurfaceNode& from, SurfaceNode& to, const SurfaceSamples& all,
              const WorldInputs& inputs, SurfaceHistory& history) noexcept;
-  /// Computes the samples up to `end` that are not computed yet, from `from` to `to`. Samples that
-  /// have a clock of their own in `skipped` are left out; null: none are.
-  /// @pre begin() with these nodes; end <= number of samples
-  void compute(const SurfaceNode& from, SurfaceNode& to, std::uint32_t end,
+  /// Does the work that is due when `passed_frac` of the time has passed, from `from` to `to`:
+  /// first it advances the samples, then it finds the heat between their columns. Samples that have
+  /// a clock of their own in `skipped` are left out; null: none are.
+  /// @pre begin() with these nodes
+  void compute(const SurfaceNode& from, SurfaceNode& to, double passed_frac,
                const SurfaceSamples& all, const LocalSteps* skipped,
                threads::WorkerPool& workers) noexcept;
+  /// Does all work that is left.
+  void finish(const SurfaceNode& from, SurfaceNode& to, const SurfaceSamples& all,
+              const LocalSteps* skipped, threads::WorkerPool& workers) noexcept;
+  /// True once `to` is complete.
+  [[nodiscard]] bool finished() const noexcept {
+    return done_ == count_ && (columns_->columns() == 0 || columns_->finished());
+  }
   /// Sets the views of entities that the next steps use; they stay in place.
   void see(std::span<const BodyView> views) noexcept { views_ = views; }
   /// Number of samples that are computed.
   [[nodiscard]] std::uint32_t done() const noexcept { return done_; }
+  /// See LocalSteps::Window.
+  [[nodiscard]] std::span<std::uint8_t> stepped_again() noexcept {
+    return columns_->stepped_again();
+  }
+  /// Main memory for the columns, in bytes.
+  [[nodiscard]] std::uint64_t bytes() const noexcept { return columns_ ? columns_->bytes() : 0; }
 
   [[nodiscard]] const IntervalRays& rays() const noexcept { return rays_; }
   [[nodiscard]] const HeatInterval& heat_interval() const noexcept { return interval_; }
@@ -72,6 +89,11 @@ class SurfaceInterval {
   }
 
  private:
+  /// Advances the samples up to `end` that are not advanced yet.
+  void advance_samples(const SurfaceNode& from, SurfaceNode& to, std::uint32_t end,
+                       const SurfaceSamples& all, const LocalSteps* skipped,
+                       threads::WorkerPool& workers) noexcept;
+
   const SurfaceGeometry& geometry_;
   const SampleHeat& heat_;
   IntervalRays rays_;
@@ -83,7 +105,9 @@ class SurfaceInterval {
   std::vector<double> body_mean_k_;  ///< by body, mean over the interval
   std::span<const BodyView> views_;
   std::uint32_t turn_ = 0;
-  std::uint32_t done_ = 0;
+  std::uint32_t count_ = 0;             ///< samples of the model
+  std::uint32_t done_ = 0;              ///< samples that are advanced
+  std::optional<ColumnSolve> columns_;  ///< set by reset()
 };
 
 }  // namespace emit::renderer

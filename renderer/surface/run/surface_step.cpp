@@ -8,6 +8,7 @@
 #include "emit/physics/check.hpp"
 #include "surface/heat/view_of_now.hpp"
 #include "surface/rays/ray_offsets.hpp"
+#include "surface/run/column_solve.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -195,9 +196,14 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
   BesideColumn beside;
   if (sample.column != kNoSample) {
     const SampleColumn& column = step.all.columns[sample.column];
-    beside = step.heat.foster()->beside(step.all, column, begin.states);
     drive.aside.column = &column;
-    drive.aside.beside = &beside;
+    if (step.columns != nullptr) {
+      drive.aside.equations = &step.columns->equations(sample.column);
+      drive.aside.change_k = step.columns->expected_change_k(sample.column);
+    } else {
+      beside = step.heat.foster()->beside(step.all, column, begin.states);
+      drive.aside.beside = &beside;
+    }
   }
   if (sample.other_side == kNoSample) {
     stepped.output = step.heat.advance(sample, normal, interval, drive, stepped.state);

@@ -14,6 +14,8 @@
 
 namespace emit::renderer {
 
+class ColumnSolve;
+
 /// Number of samples in one task of a parallel loop over samples.
 inline constexpr std::size_t kSamplesPerTask = 32;
 
@@ -26,6 +28,9 @@ struct SurfaceStep {
   std::span<const double> body_k;      ///< by body: interior, mean over the interval; offsets
   /// Views by entity of what the warm-up did not see there; empty while no entity has moved.
   std::span<const BodyView> views{};
+  /// Takes the equations of columns, whose cells it finds together afterwards. Null: each column
+  /// advances on its own, with its neighbours as they were at the begin.
+  ColumnSolve* columns = nullptr;
 };
 
 /// Result of a step of a sample. `behind` is the output of a sheet's other face, which has the same

@@ -91,64 +91,88 @@ physics::CellState<Real> ColumnSystem::product(
   return out;
 }
 
+double ColumnSystem::dot(std::uint32_t column, const Cells& a, const Cells& b) const noexcept {
+  float own = 0.0F;
+  for (std::size_t l = 0; l < kMaxColumnCells; ++l) own += a[l] * b[l];
+  return area_m2_[column] * static_cast<double>(own);
+}
+
+void ColumnSystem::form_residual(std::uint32_t column) noexcept {
+  const ColumnEquations& balance = equations_[column];
+  physics::CellState<double> diagonal = balance.diagonal_w_m2_k;
+  for (std::size_t l = 0; l < balance.count; ++l) {
+    diagonal[l] += static_cast<double>(beside_w_m2_k_[column][l]);
+    diagonal_w_m2_k_[column][l] = static_cast<float>(diagonal[l]);
+    below_w_m2_k_[column][l] = static_cast<float>(balance.below_w_m2_k[l]);
+  }
+  const physics::CellState<double> left = product(column, diagonal, balance.below_w_m2_k, cells_k_);
+  for (std::size_t l = 0; l < kMaxColumnCells; ++l) {
+    residual_[column][l] = static_cast<float>(balance.right_w_m2[l] - left[l]);
+  }
+}
+
+ColumnSystem::Part ColumnSystem::precondition(std::uint32_t column) noexcept {
+  Part out;
+  solved_[column] = solve_column(equations_[column].count, diagonal_w_m2_k_[column],
+                                 below_w_m2_k_[column], residual_[column]);
+  for (const float value_k : solved_[column]) out.most_k = std::max(out.most_k, std::abs(value_k));
+  out.size = dot(column, residual_[column], solved_[column]);
+  return out;
+}
+
+void ColumnSystem::turn_direction(std::uint32_t column, float turn) noexcept {
+  for (std::size_t l = 0; l < kMaxColumnCells; ++l) {
+    direction_[column][l] = solved_[column][l] + turn * direction_[column][l];
+  }
+}
+
+double ColumnSystem::multiply(std::uint32_t column) noexcept {
+  product_[column] = product(column, diagonal_w_m2_k_[column], below_w_m2_k_[column], direction_);
+  return dot(column, direction_[column], product_[column]);
+}
+
+void ColumnSystem::move(std::uint32_t column, float way) noexcept {
+  for (std::size_t l = 0; l < kMaxColumnCells; ++l) {
+    cells_k_[column][l] += static_cast<double>(way * direction_[column][l]);
+    residual_[column][l] -= way * product_[column][l];
+  }
+}
+
+std::uint64_t ColumnSystem::bytes() const noexcept {
+  const auto bytes_of = [](const auto& values) { return values.capacity() * sizeof(values[0]); };
+  std::uint64_t sum = bytes_of(members_) + bytes_of(island_end_) + bytes_of(island_of_) +
+                      bytes_of(area_m2_) + bytes_of(beside_w_m2_k_) + bytes_of(equations_) +
+                      bytes_of(cells_k_);
+  for (const std::vector<Cells>* vector :
+       {&residual_, &solved_, &direction_, &product_, &diagonal_w_m2_k_, &below_w_m2_k_}) {
+    sum += bytes_of(*vector);
+  }
+  return sum;
+}
+
 void ColumnSystem::solve(std::size_t island) noexcept {
   const std::span<const std::uint32_t> columns = this->columns(island);
-  // Solve each column for the residual with its neighbours held. Returns the greatest temperature
-  // that it gives.
-  const auto precondition = [&] {
-    float most_k = 0.0F;
+  const auto precondition_all = [&] {
+    Part sum;
     for (const std::uint32_t c : columns) {
-      solved_[c] =
-          solve_column(equations_[c].count, diagonal_w_m2_k_[c], below_w_m2_k_[c], residual_[c]);
-      for (const float value_k : solved_[c]) most_k = std::max(most_k, std::abs(value_k));
-    }
-    return most_k;
-  };
-  const auto dot = [&](const std::vector<Cells>& a, const std::vector<Cells>& b) {
-    double sum = 0.0;
-    for (const std::uint32_t c : columns) {
-      float own = 0.0F;
-      for (std::size_t l = 0; l < kMaxColumnCells; ++l) own += a[c][l] * b[c][l];
-      sum += area_m2_[c] * static_cast<double>(own);
+      const Part part = precondition(c);
+      sum.size += part.size;
+      sum.most_k = std::max(sum.most_k, part.most_k);
     }
     return sum;
   };
-  for (const std::uint32_t c : columns) {
-    const ColumnEquations& balance = equations_[c];
-    physics::CellState<double> diagonal = balance.diagonal_w_m2_k;
-    for (std::size_t l = 0; l < balance.count; ++l) {
-      diagonal[l] += static_cast<double>(beside_w_m2_k_[c][l]);
-      diagonal_w_m2_k_[c][l] = static_cast<float>(diagonal[l]);
-      below_w_m2_k_[c][l] = static_cast<float>(balance.below_w_m2_k[l]);
-    }
-    const physics::CellState<double> left = product(c, diagonal, balance.below_w_m2_k, cells_k_);
-    for (std::size_t l = 0; l < kMaxColumnCells; ++l) {
-      residual_[c][l] = static_cast<float>(balance.right_w_m2[l] - left[l]);
-    }
-  }
-  float most_k = precondition();
-  for (const std::uint32_t c : columns) direction_[c] = solved_[c];
-  double size = dot(residual_, solved_);
-  for (int step = 0; step < kMostSolveSteps && most_k > kSolvedK && size > 0.0; ++step) {
-    for (const std::uint32_t c : columns) {
-      product_[c] = product(c, diagonal_w_m2_k_[c], below_w_m2_k_[c], direction_);
-    }
-    const auto way = static_cast<float>(size / dot(direction_, product_));
-    for (const std::uint32_t c : columns) {
-      for (std::size_t l = 0; l < kMaxColumnCells; ++l) {
-        cells_k_[c][l] += static_cast<double>(way * direction_[c][l]);
-        residual_[c][l] -= way * product_[c][l];
-      }
-    }
-    most_k = precondition();
-    const double next = dot(residual_, solved_);
-    const auto turn = static_cast<float>(next / size);
-    size = next;
-    for (const std::uint32_t c : columns) {
-      for (std::size_t l = 0; l < kMaxColumnCells; ++l) {
-        direction_[c][l] = solved_[c][l] + turn * direction_[c][l];
-      }
-    }
+  for (const std::uint32_t c : columns) form_residual(c);
+  Part left = precondition_all();
+  float turn = 0.0F;
+  for (int step = 0; step < kMostSolveSteps && left.most_k > kSolvedK && left.size > 0.0; ++step) {
+    for (const std::uint32_t c : columns) turn_direction(c, turn);
+    double along = 0.0;
+    for (const std::uint32_t c : columns) along += multiply(c);
+    const auto way = static_cast<float>(left.size / along);
+    for (const std::uint32_t c : columns) move(c, way);
+    const Part next = precondition_all();
+    turn = static_cast<float>(next.size / left.size);
+    left = next;
   }
 }
 

@@ -11,7 +11,8 @@
 namespace emit::renderer {
 
 /// Balance of all columns of a scene over an interval. Columns that heat connects form an island;
-/// islands are solved on their own. Setup only; different islands may be used at the same time.
+/// islands are solved on their own. Different islands may be used at the same time. RT-safe but for
+/// the constructor.
 class ColumnSystem {
  public:
   /// Error of a temperature at which solve() ends, K.
@@ -44,9 +45,35 @@ class ColumnSystem {
   /// by the areas of samples, and an M-matrix.
   void solve(std::size_t island) noexcept;
 
+  [[nodiscard]] std::uint64_t bytes() const noexcept;
+
+  // Steps of the method for one column, for a caller that spreads them over time (ColumnSolve).
+  // Each may run for many columns at once, but only after the one before has run for all columns of
+  // the island.
+
+  /// A column adds this to the sums over its island.
+  struct Part {
+    double size = 0.0;    ///< to the square of the residual, or of the direction
+    float most_k = 0.0F;  ///< greatest temperature that the residual is worth
+  };
+  /// Forms what equations() and cells_k() leave unbalanced.
+  void form_residual(std::uint32_t column) noexcept;
+  /// Solves a column for its residual with its neighbours held.
+  Part precondition(std::uint32_t column) noexcept;
+  /// Adds `turn` of the old direction to the new one.
+  void turn_direction(std::uint32_t column, float turn) noexcept;
+  /// Multiplies the direction with the matrix. Returns their product.
+  [[nodiscard]] double multiply(std::uint32_t column) noexcept;
+  /// Moves the cells along the direction.
+  void move(std::uint32_t column, float way) noexcept;
+
  private:
   /// The residual takes float32 well: it is formed once in float64.
   using Cells = physics::CellState<float>;
+
+  /// Returns the product of two vectors in a column, in the measure in which the matrix is
+  /// symmetric.
+  [[nodiscard]] double dot(std::uint32_t column, const Cells& a, const Cells& b) const noexcept;
 
   /// Returns the heat that leaves a column, per area of its sample, if cells have the values `x`.
   template <class Real>

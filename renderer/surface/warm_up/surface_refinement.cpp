@@ -38,6 +38,10 @@ constexpr float kAgreeFrac = 1e-3F;
 /// Sine by which a triangle must turn its back to an eye to be unseen from there. It allows for the
 /// curvature that the normals of the vertices stand for.
 constexpr float kBackSine = 0.2F;
+/// Width in pixels down to which triangles are halved along edges of shadows that come, and the
+/// error that such an edge counts for, in tolerances.
+constexpr float kComingEdgePx = 2.0F;
+constexpr float kComingFrac = 10.0F;
 /// Share of the way to a point that must be free if the point is to be seen.
 constexpr float kSeenFrac = 0.999F;
 /// Allowed difference of the newest vertex from the mean of its parents, in tolerances, for large
@@ -108,6 +112,41 @@ glm::vec3 when_in_view(const glm::vec3& eye_m, const glm::vec3& boresight,
   return eye_m - (found_m - way_m.front());
 }
 
+/// Points of a leaf, spread evenly (R2 sequence, Roberts 2018), at other places in every leaf. They
+/// lie in the frame of the patch.
+std::array<glm::vec3, kPacketRays> spread_points_m(const std::array<std::uint32_t, 3>& leaf,
+                                                   const SurfacePatch& patch) {
+  constexpr float kStepU = 0.7548776662F;
+  constexpr float kStepV = 0.5698402910F;
+  std::array<glm::vec3, kPacketRays> points_m;
+  for (std::size_t k = 0; k < points_m.size(); ++k) {
+    const auto turn = static_cast<float>((leaf[0] * 7U + leaf[1] * 5U + leaf[2] * 3U) % 1021U +
+                                         static_cast<std::uint32_t>(k) + 1U);
+    float u = turn * kStepU - std::floor(turn * kStepU);
+    float v = turn * kStepV - std::floor(turn * kStepV);
+    if (u + v > 1.0F) {
+      u = 1.0F - u;
+      v = 1.0F - v;
+    }
+    points_m[k] = (1.0F - u - v) * patch.samples[leaf[0]].position_m +
+                  u * patch.samples[leaf[1]].position_m + v * patch.samples[leaf[2]].position_m;
+  }
+  return points_m;
+}
+
+/// Face of a leaf with the mean normal of its corners; false if they cancel.
+bool mean_face(const std::array<std::uint32_t, 3>& leaf, const SurfacePatch& patch,
+               SurfaceSample& face) {
+  const glm::vec3 normal =
+      patch.samples[leaf[0]].normal + patch.samples[leaf[1]].normal + patch.samples[leaf[2]].normal;
+  const float length = glm::length(normal);
+  if (!(length > 0.0F)) return false;
+  face.normal = normal / length;
+  face.entity = patch.entity;
+  face.material = patch.samples[leaf[0]].material;
+  return true;
+}
+
 }  // namespace
 
 SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs,
@@ -148,6 +187,10 @@ SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs,
   for (const scene::Instance& instance : inputs.geometry.instances) {
     body_m_.push_back(
         width_m(inputs.geometry.meshes[instance.mesh].bounds, instance.world_from_mesh));
+  }
+  for (const glm::dvec3& to_sun : view.coming_suns) {
+    coming_.emplace_back(std::vector<float>());
+    coming_.back().hold(to_sun);
   }
   // Find the first interval in which edges of shadows are still sharp.
   const HistoryRecord& record = inputs.record;
@@ -248,27 +291,8 @@ float SurfaceRefinement::missed_shade_k(const RefinedMesh& refined, std::uint32_
   const SurfaceSample& b = patch.samples[leaf[1]];
   const SurfaceSample& c = patch.samples[leaf[2]];
   SurfaceSample face;
-  const glm::vec3 normal = a.normal + b.normal + c.normal;
-  const float length = glm::length(normal);
-  if (!(length > 0.0F)) return 0.0F;
-  face.normal = normal / length;
-  face.entity = patch.entity;
-  face.material = a.material;
-  // Spread points evenly (R2 sequence, Roberts 2018), at other places in every leaf.
-  constexpr float kStepU = 0.7548776662F;
-  constexpr float kStepV = 0.5698402910F;
-  std::array<glm::vec3, kPacketRays> points_m;
-  for (std::size_t k = 0; k < points_m.size(); ++k) {
-    const auto turn = static_cast<float>((leaf[0] * 7U + leaf[1] * 5U + leaf[2] * 3U) % 1021U +
-                                         static_cast<std::uint32_t>(k) + 1U);
-    float u = turn * kStepU - std::floor(turn * kStepU);
-    float v = turn * kStepV - std::floor(turn * kStepV);
-    if (u + v > 1.0F) {
-      u = 1.0F - u;
-      v = 1.0F - v;
-    }
-    points_m[k] = (1.0F - u - v) * a.position_m + u * b.position_m + v * c.position_m;
-  }
+  if (!mean_face(leaf, patch, face)) return 0.0F;
+  const std::array<glm::vec3, kPacketRays> points_m = spread_points_m(leaf, patch);
   const float facet_m = std::max({a.facet_m, b.facet_m, c.facet_m});
   const float sun_offset_m = ray_offsets(a.position_m, facet_m).sun_m;
   std::array<float, kPacketRays> missed_k{};
@@ -293,6 +317,25 @@ float SurfaceRefinement::missed_shade_k(const RefinedMesh& refined, std::uint32_
   float most_k = 0.0F;
   for (const float k : missed_k) most_k = std::max(most_k, std::abs(k));
   return most_k;
+}
+
+bool SurfaceRefinement::shadow_edge_comes(const RefinedMesh& refined, std::uint32_t slot,
+                                          const SurfacePatch& patch) const {
+  const auto& leaf = refined.leaf(slot);
+  SurfaceSample face;
+  if (patch.entity >= 0 || !mean_face(leaf, patch, face)) return false;
+  // Take the corners too: an edge that cuts one off may miss all points between them.
+  std::array<glm::vec3, kPacketRays> points_m = spread_points_m(leaf, patch);
+  float facet_m = 0.0F;
+  for (std::size_t i = 0; i < 3; ++i) {
+    points_m[i] = patch.samples[leaf[i]].position_m;
+    facet_m = std::max(facet_m, patch.samples[leaf[i]].facet_m);
+  }
+  const float sun_offset_m = ray_offsets(points_m[0], facet_m).sun_m;
+  return std::ranges::any_of(coming_, [&](const IntervalRays& rays) {
+    const IntervalRays::Spots spots = rays.spots(in_.rays, face, points_m, sun_offset_m);
+    return spots.lit != 0U && spots.lit != spots.faced;
+  });
 }
 
 SurfaceRefinement::Judged SurfaceRefinement::need(const RefinedMesh& refined, std::uint32_t slot,
@@ -364,6 +407,11 @@ SurfaceRefinement::Judged SurfaceRefinement::need(const RefinedMesh& refined, st
     if (back != nullptr && error_k == 0.0F) {
       count_in(missed_shade_k(refined, slot, *back), kMissedFrac);
     }
+  }
+  const float coming_k = kComingFrac * tolerance_k_;
+  if (!coming_.empty() && edge_px >= kComingEdgePx && error_k < coming_k &&
+      shadow_edge_comes(refined, slot, patch)) {
+    error_k = coming_k;
   }
   const float weighed_px = std::max(width.in_view_px, kAsideFrac * width.anywhere_px);
   judged.need = error_k / tolerance_k_ * weighed_px;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "surface/model/drive_sensitivity.hpp"
+#include "surface/rays/interval_rays.hpp"
 #include "surface/warm_up/surface_bend.hpp"
 #include "surface/warm_up/surface_patch.hpp"
 
@@ -20,7 +21,8 @@ namespace emit::renderer {
 /// - if its newest vertex differs from the mean of its parents by more than the tolerance allows;
 /// - if the surface as loaded faces elsewhere than its corners;
 /// - near edges and feet of bodies, because heat moves along the surface there;
-/// - if sunlight fell on its corners unequally of late, because an edge of a shadow runs through.
+/// - if sunlight fell on its corners unequally of late, because an edge of a shadow runs through;
+/// - if an edge of a shadow will run through it at the instant of a planned frame.
 ///
 /// A triangle is never halved below some pixels at the nearest place of the camera. The limit is
 /// one pixel along edges of shadows and between temperatures far apart. If no place of the camera
@@ -92,6 +94,10 @@ class SurfaceRefinement {
   /// count in which the corners agree that the sun shone or that it did not.
   [[nodiscard]] float missed_shade_k(const RefinedMesh& refined, std::uint32_t slot,
                                      const SurfacePatch& patch) const;
+  /// Returns true if the edge of a shadow of static geometry will run through the triangle at the
+  /// instant of a planned frame.
+  [[nodiscard]] bool shadow_edge_comes(const RefinedMesh& refined, std::uint32_t slot,
+                                       const SurfacePatch& patch) const;
 
   const SurfaceInputs& in_;
   const DriveSensitivity& sensitivity_;
@@ -113,6 +119,7 @@ class SurfaceRefinement {
   };
   std::vector<CreaseSize> crease_sizes_;  ///< by material
   std::size_t recent_ = 0;                ///< first interval that counts as recent
+  std::vector<IntervalRays> coming_;      ///< rays to the sun at the instants of planned frames
   /// Judgement of a leaf: the node of the mesh that was judged, and its need.
   struct Judged {
     std::uint32_t node = 0xffffffffU;

@@ -273,15 +273,12 @@ Result<Truth> solve_truth(const scene::ScenarioDesc& scenario, const reference::
   if (!geometry) return tl::unexpected(geometry.error());
   scene::adopt_sheets(*geometry);
   Truth truth;
-  Progress progress("reference of " + label, 1000);
+  Progress progress("reference of " + label, kShareParts);
   reference::SolveOptions options;
   options.rays = command.rays;
   options.refine = command.refine;
   options.pixels = command.pixels;
-  options.progress = [&progress](double done_frac) {
-    progress.advance_to(static_cast<std::uint64_t>(1000.0 * done_frac));
-    return !InterruptGuard::interrupted();
-  };
+  options.progress = share_of(progress);
   const auto start = Clock::now();
   auto images = reference::solve(scenario, *geometry, std::span(&view, 1), options, &truth.report);
   if (!images) return tl::unexpected(images.error());

@@ -87,12 +87,9 @@ class Flight {
   }
 
   Result<void> warm_up() {
-    Progress bar("warm-up", 1000);
+    Progress bar("warm-up", kShareParts);
     const auto start = Clock::now();
-    auto ready = renderer_->warm_up(request(0), [&](double done_frac) {
-      bar.advance_to(static_cast<std::uint64_t>(1000.0 * done_frac));
-      return !InterruptGuard::interrupted();
-    });
+    auto ready = renderer_->warm_up(request(0), share_of(bar));
     if (InterruptGuard::interrupted()) return make_error(ErrorCode::io, "interrupted");
     warm_up_s_ = std::chrono::duration<double>(Clock::now() - start).count();
     return ready;

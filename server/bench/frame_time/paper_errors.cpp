@@ -38,12 +38,9 @@ Result<std::size_t> PaperReference::picture_of(const reference::SolveView& view)
   for (std::size_t i = 0; i < pictures_.size(); ++i) {
     if (same_view(pictures_[i].view, view)) return i;
   }
-  Progress progress("reference of " + label_, 1000);
+  Progress progress("reference of " + label_, kShareParts);
   ConvergedOptions options = options_;
-  options.progress = [&progress](double done_frac) {
-    progress.advance_to(static_cast<std::uint64_t>(1000.0 * done_frac));
-    return !InterruptGuard::interrupted();
-  };
+  options.progress = share_of(progress);
   auto pixels = history_.picture(view, options);
   if (!pixels) return tl::unexpected(std::move(pixels.error()));
   pictures_.push_back({view, std::move(*pixels)});

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -10,15 +9,17 @@
 #include <vector>
 
 #include "emit/renderer/renderer.hpp"
-#include "emit/scene/trajectory.hpp"
 #include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
+#include "tool/offline/film.hpp"
+#include "tool/offline/offline_frames.hpp"
+#include "tool/offline/preview.hpp"
+#include "tool/offline/time_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/frame_files.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
 #include "tool/support/output_check.hpp"
-#include "tool/support/progress.hpp"
 #include "tool/support/scenario_input.hpp"
 
 namespace emit::tool {
@@ -26,27 +27,18 @@ namespace {
 
 struct RenderOptions {
   ScenarioChoice input;
-  std::vector<double> times_s;
+  TimeChoice times;
   std::filesystem::path out;
   std::optional<std::filesystem::path> png;
   std::string png_of = "apparent";
+  std::optional<std::filesystem::path> film;
+  double film_rate_hz = 10.0;
   std::optional<std::filesystem::path> json;
   std::vector<std::string> channels;  ///< empty: all of temperature, depth, object
   std::vector<std::string> bands;     ///< empty: the scenario's first
   std::string quality = "full";
   int gpu_index = -1;
 };
-
-/// Settings of --quality preview. They cost a few seconds for a scene of 50'000 triangles.
-std::vector<std::string> preview_set() {
-  return {"thermal.method=\"cached\"", "thermal.max_samples=320000", "thermal.tolerance_k=2",
-          "thermal.first_step_s=120",  "thermal.lateral=false",      "thermal.exchange=false",
-          "thermal.shadow_map_px=512", "thermal.max_cascades=1"};
-}
-
-constexpr const char* kPreviewText =
-    "preview: leaves out conduction along the surface and exchange of radiation between faces; "
-    "temperatures aim at 2 K instead of thermal.tolerance_k, and shadows are coarse\n";
 
 /// Frames of one run: an image at every instant, which all bands take their radiance from.
 struct Plan {
@@ -55,11 +47,6 @@ struct Plan {
   FrameFileNames exr_names;
   std::optional<FrameFileNames> png_names;
 };
-
-double ms_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
-      .count();
-}
 
 bool wants(const RenderOptions& command, const char* channel) {
   return command.channels.empty() || std::find(command.channels.begin(), command.channels.end(),
@@ -85,32 +72,11 @@ Json plane_json(std::span<const float> plane) {
   return json;
 }
 
-/// Milliseconds that the steps of a run took.
-struct Times {
-  double setup_ms = 0.0;
-  double warm_up_ms = 0.0;
-  double frame_ms = 0.0;
-};
-
-std::int64_t time_ns(double time_s) {
-  return std::llround(time_s * 1e9);
-}
-
-template <class Value>
-void sort_unique(std::vector<Value>& values) {
-  std::ranges::sort(values);
-  values.erase(std::unique(values.begin(), values.end()), values.end());
-}
-
 /// Errors: invalid_argument (a time that is none, a band that the scenario does not have).
 physics::Result<Plan> make_plan(const RenderOptions& command, const scene::ScenarioDesc& scenario) {
-  std::vector<double> times_s = command.times_s;
-  for (const double time_s : times_s) {
-    if (!std::isfinite(time_s) || std::abs(time_s) > 9e9) {
-      return physics::make_error(physics::ErrorCode::invalid_argument, "--time-s: not a time");
-    }
-  }
-  sort_unique(times_s);
+  auto resolved = resolve_times(command.times, scenario);
+  if (!resolved) return tl::unexpected(std::move(resolved.error()));
+  const std::vector<double>& times_s = *resolved;
   std::vector<std::size_t> bands;
   const std::vector<std::string> first{""};
   for (const std::string& name : command.bands.empty() ? first : command.bands) {
@@ -126,14 +92,21 @@ physics::Result<Plan> make_plan(const RenderOptions& command, const scene::Scena
   return plan;
 }
 
-/// Checks the extensions before the scenario is read. Errors: invalid_argument, naming the option.
+/// Checks the names of the files before the scenario is read. Errors: those of check_image_name()
+/// and Film::check(), naming the option.
 physics::Result<void> check_names(const RenderOptions& command) {
   if (auto exr = check_image_name(command.out, ImageFormat::exr); !exr) {
     return tl::unexpected(std::move(exr.error()).with_context("--out"));
   }
-  if (!command.png) return {};
-  if (auto png = check_image_name(*command.png, ImageFormat::png); !png) {
-    return tl::unexpected(std::move(png.error()).with_context("--png"));
+  if (command.png) {
+    if (auto png = check_image_name(*command.png, ImageFormat::png); !png) {
+      return tl::unexpected(std::move(png.error()).with_context("--png"));
+    }
+  }
+  if (command.film) {
+    if (auto film = Film::check(*command.film); !film) {
+      return tl::unexpected(std::move(film.error()).with_context("--film"));
+    }
   }
   return {};
 }
@@ -155,45 +128,15 @@ physics::Result<void> check_outputs(const Plan& plan, const scene::ScenarioDesc&
   return {};
 }
 
-/// Surfaces need only be fine enough for these frames, unless their state is shared with others.
-void keep_only_views_at(const std::vector<double>& times_s, scene::ScenarioDesc& scenario) {
-  const scene::Trajectory way = scenario.sensor.trajectory;
-  if (way.size() <= 1 || !scenario.thermal.state_file.empty()) return;
-  scenario.sensor.trajectory.clear();
-  for (const double time_s : times_s) {
-    const std::int64_t sim_time_ns = time_ns(time_s);
-    scenario.sensor.trajectory.push_back(
-        {sim_time_ns, scene::trajectory_at(way, sim_time_ns).pose});
-  }
-}
-
 renderer::OutputOptions output_options(const RenderOptions& command) {
   renderer::OutputOptions output;
-  output.temperature = wants(command, "temperature") ||
-                       (command.png && png_quantity(command.png_of) == PngQuantity::temperature);
+  output.temperature =
+      wants(command, "temperature") ||
+      ((command.png || command.film) && png_quantity(command.png_of) == PngQuantity::temperature);
   output.depth = wants(command, "depth");
   output.object = wants(command, "object");
   output.slots = 2;
   return output;
-}
-
-/// Errors: those of Renderer::warm_up().
-physics::Result<void> warm_up(renderer::Renderer& renderer, const renderer::FrameRequest& first) {
-  Progress progress("warm-up", 1000);
-  return renderer.warm_up(first, [&progress](double done_frac) {
-    progress.advance_to(static_cast<std::uint64_t>(1000.0 * done_frac));
-    return !InterruptGuard::interrupted();
-  });
-}
-
-/// Brings the surface to the instant of a frame. Errors: those of Renderer::carry_on().
-physics::Result<void> carry_on(renderer::Renderer& renderer, const renderer::FrameRequest& to) {
-  Progress progress(
-      fmt::format("surface at {:g} s", 1e-9 * static_cast<double>(to.thermal_time_ns)), 1000);
-  return renderer.carry_on(to, [&progress](double done_frac) {
-    progress.advance_to(static_cast<std::uint64_t>(1000.0 * done_frac));
-    return !InterruptGuard::interrupted();
-  });
 }
 
 /// One run: it renders the plan and writes files, lines and JSON.
@@ -205,8 +148,7 @@ class Rendering {
   [[nodiscard]] physics::Result<void> run();
 
  private:
-  [[nodiscard]] physics::Result<void> create();
-  [[nodiscard]] physics::Result<void> render(std::size_t index);
+  [[nodiscard]] physics::Result<void> render(double time_s);
   [[nodiscard]] physics::Result<void> write_files(double time_s, std::size_t band,
                                                   const renderer::FrameView& view);
   void print_frame(double time_s, std::size_t band, const renderer::FrameView& view) const;
@@ -214,39 +156,37 @@ class Rendering {
   [[nodiscard]] Json run_json() const;
   [[nodiscard]] Json frame_json(double time_s, std::size_t band,
                                 const renderer::FrameView& view) const;
+  [[nodiscard]] physics::Result<void> write_pictures(double time_s, std::size_t band,
+                                                     FramePlanes& planes);
   [[nodiscard]] physics::Result<void> write_json_file() const;
-  [[nodiscard]] renderer::FrameRequest request(std::size_t index) const;
 
   const RenderOptions& command_;
   const scene::ScenarioDesc& scenario_;
   const Plan& plan_;
   std::vector<std::optional<ApparentTemperature>> apparent_;  ///< of the bands that were shown
-  std::unique_ptr<renderer::Renderer> renderer_;
-  Times times_;
-  std::vector<Json> frames_;
+  std::unique_ptr<OfflineFrames> frames_;
+  std::optional<Film> film_;
+  std::vector<Json> json_frames_;
 };
 
-renderer::FrameRequest Rendering::request(std::size_t index) const {
-  renderer::FrameRequest out;
-  out.frame_number = index + 1;
-  out.sim_time_ns = out.thermal_time_ns = time_ns(plan_.times_s[index]);
-  out.sensor_pose = renderer_->scenario_sensor_pose_at(out.sim_time_ns);
-  return out;
-}
-
-physics::Result<void> Rendering::create() {
-  auto start = std::chrono::steady_clock::now();
-  auto created =
-      renderer::Renderer::create(scenario_, {command_.gpu_index, false}, output_options(command_));
-  if (!created) return tl::unexpected(std::move(created.error()));
-  renderer_ = std::move(*created);
-  times_.setup_ms = ms_since(start);
-  for (const std::string& text : renderer_->scene_stats().warnings) warn(text);
-  start = std::chrono::steady_clock::now();
-  if (auto warm = warm_up(*renderer_, request(0)); !warm) return warm;
-  times_.warm_up_ms = ms_since(start);
-  for (const std::string& text : renderer::warm_up_warnings(renderer_->scene_stats())) warn(text);
-  return {};
+/// Writes the PNG and the picture of the film.
+physics::Result<void> Rendering::write_pictures(double time_s, std::size_t band,
+                                                FramePlanes& planes) {
+  const bool filmed = film_ && band == plan_.bands.front();
+  if (!plan_.png_names && !filmed) return {};
+  const scene::SpectralBand& shown = scenario_.bands[band];
+  const PngStyle style{scenario_.display.min_k, scenario_.display.max_k,
+                       png_quantity(command_.png_of)};
+  if (style.quantity == PngQuantity::apparent && !apparent_[band]) {
+    apparent_[band].emplace(spectral_band(shown));
+  }
+  planes.apparent = apparent_[band] ? &*apparent_[band] : nullptr;
+  if (plan_.png_names) {
+    const auto file = plan_.png_names->file(time_s, shown.name);
+    if (auto done = write_frame_png(file, planes, style); !done) return done;
+  }
+  if (!filmed) return {};
+  return write_frame_png(film_->next_picture(), planes, style);
 }
 
 physics::Result<void> Rendering::write_files(double time_s, std::size_t band,
@@ -262,34 +202,25 @@ physics::Result<void> Rendering::write_files(double time_s, std::size_t band,
   planes.metadata = {view.sim_time_ns, view.frame_number,  view.sensor_pose,
                      shown.name,       shown.lo_um,        shown.hi_um,
                      "W m-2 sr-1",     response_of(shown), view.fov_h_rad};
-  if (plan_.png_names) {
-    const PngStyle style{scenario_.display.min_k, scenario_.display.max_k,
-                         png_quantity(command_.png_of)};
-    if (style.quantity == PngQuantity::apparent && !apparent_[band]) {
-      apparent_[band].emplace(spectral_band(shown));
-    }
-    planes.apparent = apparent_[band] ? &*apparent_[band] : nullptr;
-    const auto file = plan_.png_names->file(time_s, shown.name);
-    if (auto done = write_frame_png(file, planes, style); !done) return done;
-  }
+  if (auto done = write_pictures(time_s, band, planes); !done) return done;
   if (!wants(command_, "temperature")) planes.temperature_k = {};
   return write_frame_exr(plan_.exr_names.file(time_s, shown.name), planes);
 }
 
 void Rendering::print_frame(double time_s, std::size_t band,
                             const renderer::FrameView& view) const {
-  const renderer::SceneStats& scene = renderer_->scene_stats();
+  const renderer::SceneStats& scene = frames_->renderer().scene_stats();
   const std::string& name = scenario_.bands[band].name;
   fmt::print(
       text_stream(command_.json),
       "{}: {}x{}, sim time {:.3f} s, band {}, {} triangles, setup {:.0f} ms, warm-up {:.0f} ms{}, "
       "frame {:.1f} ms, {}\n",
       plan_.exr_names.file(time_s, name).string(), view.width_px, view.height_px, time_s, name,
-      scene.triangles, times_.setup_ms, times_.warm_up_ms,
+      scene.triangles, frames_->setup_ms(), frames_->warm_up_ms(),
       scene.samples > 0 ? fmt::format(" ({} thermal samples, {:.0f} MiB)", scene.samples,
                                       static_cast<double>(scene.sample_bytes) / (1 << 20))
                         : std::string(),
-      times_.frame_ms, renderer_->device_name());
+      frames_->frame_ms(), frames_->renderer().device_name());
 }
 
 void Rendering::print_warnings(const renderer::FrameView& view) const {
@@ -311,12 +242,12 @@ void Rendering::print_warnings(const renderer::FrameView& view) const {
 }
 
 Json Rendering::run_json() const {
-  const renderer::SceneStats& scene = renderer_->scene_stats();
+  const renderer::SceneStats& scene = frames_->renderer().scene_stats();
   Json json = Json::object();
-  json.set("device", renderer_->device_name()).set("scenario", scenario_.name);
+  json.set("device", frames_->renderer().device_name()).set("scenario", scenario_.name);
   json.set("quality", command_.quality);
   json.set("triangles", scene.triangles);
-  json.set("setup_ms", times_.setup_ms).set("warm_up_ms", times_.warm_up_ms);
+  json.set("setup_ms", frames_->setup_ms()).set("warm_up_ms", frames_->warm_up_ms());
   json.set("samples", scene.samples).set("sample_bytes", scene.sample_bytes);
   return json;
 }
@@ -325,7 +256,7 @@ Json Rendering::frame_json(double time_s, std::size_t band, const renderer::Fram
   Json json = Json::object();
   json.set("sim_time_s", time_s).set("band", scenario_.bands[band].name);
   json.set("width", view.width_px).set("height", view.height_px);
-  json.set("frame_ms", times_.frame_ms);
+  json.set("frame_ms", frames_->frame_ms());
   json.set("nonfinite_px", view.stats.nonfinite_px);
   json.set("clamped_px", view.stats.clamped_px);
   json.set("radiance", plane_json(view.radiance_w_m2_sr[band]));
@@ -342,51 +273,47 @@ Json Rendering::frame_json(double time_s, std::size_t band, const renderer::Fram
 physics::Result<void> Rendering::write_json_file() const {
   if (!command_.json) return {};
   Json json = run_json();
-  if (frames_.size() == 1) json.merge(frames_.front());
+  if (json_frames_.size() == 1) json.merge(json_frames_.front());
   Json frames = Json::array();
-  for (const Json& frame : frames_) frames.push(frame);
+  for (const Json& frame : json_frames_) frames.push(frame);
   json.set("frames", std::move(frames));
   return write_json(*command_.json, json);
 }
 
-physics::Result<void> Rendering::render(std::size_t index) {
-  const double time_s = plan_.times_s[index];
-  const renderer::FrameRequest wanted = request(index);
-  if (index > 0) {
-    if (auto there = carry_on(*renderer_, wanted); !there) return there;
-  }
-  const auto start = std::chrono::steady_clock::now();
-  const int slot = renderer_->submit(wanted);
-  if (slot < 0) {
-    return physics::make_error(physics::ErrorCode::internal, "the renderer has no free slot");
-  }
-  const renderer::FrameView& view = renderer_->collect(static_cast<renderer::SlotIndex>(slot));
-  times_.frame_ms = ms_since(start);
-  if (view.device_failed) {
-    return physics::make_error(physics::ErrorCode::gpu,
-                               "the device reported an error: the frame is not written");
-  }
+physics::Result<void> Rendering::render(double time_s) {
+  const auto rendered = frames_->next();
+  if (!rendered) return tl::unexpected(rendered.error());
+  const renderer::FrameView& view = **rendered;
+  frames_->clear_bar();
   for (const std::size_t band : plan_.bands) {
     if (auto done = write_files(time_s, band, view); !done) return done;
     print_frame(time_s, band, view);
     Json json = frame_json(time_s, band, view);
     const std::string& name = scenario_.bands[band].name;
     json.set("file", plan_.exr_names.file(time_s, name).string());
-    frames_.push_back(std::move(json));
+    json_frames_.push_back(std::move(json));
   }
   print_warnings(view);
-  renderer_->release(static_cast<renderer::SlotIndex>(slot));
   return {};
 }
 
 physics::Result<void> Rendering::run() {
   const InterruptGuard interrupt;
-  if (auto created = create(); !created) return created;
-  for (std::size_t i = 0; i < plan_.times_s.size(); ++i) {
-    if (InterruptGuard::interrupted()) {
-      return physics::make_error(physics::ErrorCode::internal, "interrupted");
-    }
-    if (auto rendered = render(i); !rendered) return rendered;
+  if (command_.film) {
+    film_.emplace(*command_.film, command_.film_rate_hz);
+    if (auto begun = film_->begin(); !begun) return begun;
+  }
+  auto frames = OfflineFrames::create(scenario_, sensor_shots(scenario_, plan_.times_s),
+                                      output_options(command_), command_.gpu_index);
+  if (!frames) return tl::unexpected(std::move(frames.error()));
+  frames_ = std::move(*frames);
+  for (const double time_s : plan_.times_s) {
+    if (auto rendered = render(time_s); !rendered) return rendered;
+  }
+  if (film_) {
+    if (auto made = film_->finish(); !made) return made;
+    fmt::print(text_stream(command_.json), "{}: {} pictures, {:g} a second\n",
+               command_.film->string(), plan_.times_s.size(), command_.film_rate_hz);
   }
   return write_json_file();
 }
@@ -394,38 +321,37 @@ physics::Result<void> Rendering::run() {
 int run(const RenderOptions& command) {
   if (auto named = check_names(command); !named) return fail_call(named.error());
   ScenarioChoice input = command.input;
-  if (command.quality == "preview") {
-    // The keys that the user sets come later, so that they count.
-    const std::vector<std::string> preview = preview_set();
-    input.set.insert(input.set.begin(), preview.begin(), preview.end());
-  }
-  auto scenario = load_scenario_choice(input);
+  if (command.quality == "preview") set_preview(input.set);
+  const auto scenario = load_scenario_choice(input);
   if (!scenario) return fail_config(scenario.error());
   const auto plan = make_plan(command, *scenario);
   if (!plan) return fail(kExitUsage, plan.error().text);
   if (auto writable = check_outputs(*plan, *scenario); !writable) return fail(writable.error());
   if (command.quality == "preview") fmt::print(text_stream(command.json), kPreviewText);
-  keep_only_views_at(plan->times_s, *scenario);
   if (auto done = Rendering(command, *scenario, *plan).run(); !done) return fail(done.error());
   return kExitOk;
 }
 
 void add_options(CommandLine& line, RenderOptions& options) {
   add_scenario(line, options.input, "scenario");
-  line.option(
-          "--time-s", options.times_s,
-          "Simulated time since the scenario's epoch, s; repeatable: all are rendered after one "
-          "warm-up, in ascending order. As in the daemon, edges of shadows that moved since the "
-          "first time may be coarser than in a run of their own")
-      .repeatable()
-      .type_name("S")
-      .required();
+  add_times(
+      line, options.times,
+      "repeatable: all times are rendered after one warm-up, in ascending order. Surfaces are "
+      "refined along the shadows of all of them, except those of entities. Of block-on-road "
+      "99 % of the pixels lie within 0.9 K of a run of their own, RMS 0.35 K; single pixels "
+      "along edges of shadows differ by more");
   line.path("--out", options.out,
             "OpenEXR file to write. {time} and {band} in the name stand for time and band of the "
             "frame; without them several times add _t<time>, and several bands add _<band>, before "
             "the extension")
       .required();
   line.path("--png", options.png, "False-colour image as PNG; the name is made as that of --out");
+  line.path("--film", options.film,
+            "Film of the PNG pictures of the first band, in the order of the times: .webp "
+            "(animated, lossless) or .mp4; needs the program ffmpeg");
+  line.option("--film-rate-hz", options.film_rate_hz, "Pictures a second of the film")
+      .in_range(0.1, 120.0)
+      .show_default();
   add_png_of(line, options.png_of, true);
   line.option("--channel", options.channels,
               "Channel beside radiance: temperature, depth, object; repeatable; default all")

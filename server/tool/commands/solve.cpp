@@ -14,6 +14,7 @@
 #include "emit/scene/sheets.hpp"
 #include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
+#include "tool/offline/time_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/frame_files.hpp"
 #include "tool/support/interrupt.hpp"
@@ -30,7 +31,7 @@ namespace {
 
 struct SolveOptions {
   ScenarioChoice input;
-  std::vector<double> times_s;
+  TimeChoice times;
   std::filesystem::path out;  ///< empty: no pictures
   std::optional<std::filesystem::path> png;
   std::string png_of = "apparent";
@@ -87,10 +88,7 @@ reference::SolveOptions solver_options(const SolveOptions& command, Progress& ba
   options.pixels = command.pixels;
   options.spin_up_s = 3600.0 * command.spin_up_h;
   options.checkpoint = command.checkpoint.value_or(std::filesystem::path());
-  options.progress = [&bar](double done_frac) {
-    bar.advance_to(static_cast<std::uint64_t>(1000.0 * std::clamp(done_frac, 0.0, 1.0)));
-    return !InterruptGuard::interrupted();
-  };
+  options.progress = share_of(bar);
   return options;
 }
 
@@ -99,14 +97,9 @@ reference::SolveOptions solver_options(const SolveOptions& command, Progress& ba
 physics::Result<SolvePlan> make_plan(const SolveOptions& command,
                                      const scene::ScenarioDesc& scenario) {
   SolvePlan plan;
-  plan.times_s = command.times_s;
-  for (const double time_s : plan.times_s) {
-    if (!std::isfinite(time_s) || std::abs(time_s) > 9e9) {
-      return physics::make_error(physics::ErrorCode::invalid_argument, "--time-s: not a time");
-    }
-  }
-  std::ranges::sort(plan.times_s);
-  plan.times_s.erase(std::unique(plan.times_s.begin(), plan.times_s.end()), plan.times_s.end());
+  auto times_s = resolve_times(command.times, scenario);
+  if (!times_s) return tl::unexpected(std::move(times_s.error()));
+  plan.times_s = std::move(*times_s);
   const std::vector<std::string> first{""};
   for (const std::string& name : command.bands.empty() ? first : command.bands) {
     const auto band = find_band(scenario, name);
@@ -314,7 +307,7 @@ physics::Result<void> Solving::write_tables() const {
 
 physics::Result<void> Solving::run(const scene::SceneGeometry& geometry) {
   const InterruptGuard interrupts;
-  Progress bar("solve", 1000);
+  Progress bar("solve", kShareParts);
   const auto start = std::chrono::steady_clock::now();
   reference::SolveOptions options = solver_options(command_, bar);
   options.first_ns = std::llround(plan_.times_s.front() * 1e9);
@@ -371,11 +364,7 @@ int run(const SolveOptions& command) {
 
 void add_options(CommandLine& line, SolveOptions& options) {
   add_scenario(line, options.input, "scenario");
-  line.option("--time-s", options.times_s,
-              "Simulated time since the scenario's epoch, s; repeatable: one history gives all")
-      .repeatable()
-      .type_name("S")
-      .required();
+  add_times(line, options.times, "repeatable: one history gives all");
   line.path("--out", options.out,
             "OpenEXR file to write. {time}, {band} and {camera} in the name stand for those of the "
             "picture; without them several add _t<time>, _<band> and _<camera> before the "

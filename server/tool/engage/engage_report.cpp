@@ -14,6 +14,7 @@
 
 #include "emit/physics/constants.hpp"
 #include "tool/engage/flight_plots.hpp"
+#include "tool/report/html_page.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/statistics.hpp"
 
@@ -167,14 +168,6 @@ std::string base64(const std::string& bytes) {
   return out;
 }
 
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    out += c == '&' ? "&amp;" : c == '<' ? "&lt;" : c == '>' ? "&gt;" : std::string(1, c);
-  }
-  return out;
-}
-
 physics::Result<std::string> film_html(const std::filesystem::path& folder,
                                        const LoopRecord& record, bool guided) {
   std::string out = "<div class=\"film\">\n";
@@ -312,19 +305,11 @@ std::string engage_text(const EngageResults& results) {
 physics::Result<void> write_engage_html(const std::filesystem::path& file,
                                         const std::filesystem::path& folder,
                                         const EngageResults& results) {
-  std::string out =
-      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-      "<title>emit engage</title>\n<style>\n"
-      "body { font: 15px/1.45 sans-serif; color: #222; max-width: 1160px; margin: 2em auto; }\n"
-      "table { border-collapse: collapse; }\n"
-      "td { padding: 3px 18px 3px 0; border-bottom: 1px solid #ddd; }\n"
-      ".film { display: flex; flex-wrap: wrap; gap: 10px; }\n"
-      "figure { margin: 0; }\nfigcaption { font-size: 13px; color: #555; }\n"
-      ".mark path { stroke: #0ff; stroke-width: 1.2; fill: none; }\n"
-      "svg { max-width: 100%; height: auto; }\n</style>\n</head>\n<body>\n";
-  out += fmt::format("<h1>Closed loop on {}</h1>\n<table>\n", escaped(results.scenario));
+  std::string out;
+  out += fmt::format("<h1>Closed loop on {}</h1>\n<table>\n", html_escaped(results.scenario));
   for (const Row& row : rows_of(results)) {
-    out += fmt::format("<tr><td>{}</td><td>{}</td></tr>\n", escaped(row.name), escaped(row.value));
+    out += fmt::format("<tr><td>{}</td><td>{}</td></tr>\n", html_escaped(row.name),
+                       html_escaped(row.value));
   }
   out += "</table>\n";
   if (results.flight) {
@@ -332,7 +317,7 @@ physics::Result<void> write_engage_html(const std::filesystem::path& file,
     out += fmt::format(
         "<p>Apparent temperature in the band {}. The cross marks where the seeker found its "
         "target.</p>\n",
-        escaped(results.band));
+        html_escaped(results.band));
     const auto film = film_html(folder, *results.flight, results.outcome.has_value());
     if (!film) return tl::unexpected(film.error());
     out += *film;
@@ -346,18 +331,14 @@ physics::Result<void> write_engage_html(const std::filesystem::path& file,
         "for the time of the picture. Right: the template is that of the first picture's "
         "time.</p>\n",
         results.study->templates, results.study->template_px, results.study->template_px,
-        results.study->search_px, escaped(results.study->band), 1e3 * results.study->noise_k);
+        results.study->search_px, html_escaped(results.study->band), 1e3 * results.study->noise_k);
     out += svg_document(study_plots(*results.study));
   }
-  out += "</body>\n</html>\n";
-  std::ofstream stream(file, std::ios::binary);
-  stream << out;
-  stream.flush();
-  if (!stream) {
-    return physics::make_error(physics::ErrorCode::io,
-                               fmt::format("{}: cannot be written", file.string()));
-  }
-  return {};
+  constexpr const char* kStyle =
+      ".film { display: flex; flex-wrap: wrap; gap: 10px; }\n"
+      "figure { margin: 0; }\nfigcaption { font-size: 13px; color: #555; }\n"
+      ".mark path { stroke: #0ff; stroke-width: 1.2; fill: none; }\n";
+  return write_html(file, html_page("emit engage", kStyle, out));
 }
 
 }  // namespace emit::tool

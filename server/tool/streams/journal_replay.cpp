@@ -308,13 +308,9 @@ ReplayBench renderer_bench(const scene::ScenarioDesc& scenario, const JournalRep
     // A frame has an image for each camera, all of which are kept for repetitions.
     output.slots = server::kMaxCameras;
     output.ladder = renderer::Ladder::replayed;
-    Progress warm_up("warm-up", 1000);
-    return server::make_renderer_source(
-        scenario, renderer::DeviceOptions{gpu_index, false}, output, first_time_ns,
-        [&](double done_frac) {
-          warm_up.advance_to(static_cast<std::uint64_t>(1000.0 * done_frac));
-          return !InterruptGuard::interrupted();
-        });
+    Progress warm_up("warm-up", kShareParts);
+    return server::make_renderer_source(scenario, renderer::DeviceOptions{gpu_index, false}, output,
+                                        first_time_ns, share_of(warm_up));
   };
   return bench;
 }

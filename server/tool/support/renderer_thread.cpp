@@ -73,11 +73,8 @@ Result<double> RendererThread::warm_up(const renderer::FrameRequest& first) {
   Result<void> ready;
   const auto start = Clock::now();
   call([&] {
-    Progress progress("warm-up", 1000);
-    ready = renderer_->warm_up(first, [&progress](double done_frac) {
-      progress.advance_to(static_cast<std::uint64_t>(1000.0 * done_frac));
-      return !InterruptGuard::interrupted();
-    });
+    Progress progress("warm-up", kShareParts);
+    ready = renderer_->warm_up(first, share_of(progress));
   });
   if (InterruptGuard::interrupted()) return make_error(ErrorCode::io, "interrupted");
   if (!ready) return tl::unexpected(std::move(ready.error()));

@@ -6,8 +6,12 @@
 #include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <cstdlib>
 #include <cstring>
+#include <string_view>
 #include <system_error>
 #include <thread>
 
@@ -69,6 +73,22 @@ std::optional<int> Subprocess::wait(std::chrono::milliseconds timeout) {
 
 void Subprocess::send_signal(int signal_number) noexcept {
   if (pid_ > 0 && !status_) ::kill(pid_, signal_number);
+}
+
+std::optional<std::filesystem::path> find_program(const std::string& name) {
+  const char* path = std::getenv("PATH");
+  std::string_view rest = path != nullptr ? path : "/usr/bin:/bin";
+  while (!rest.empty()) {
+    const std::string_view folder = rest.substr(0, rest.find(':'));
+    rest.remove_prefix(std::min(folder.size() + 1, rest.size()));
+    std::filesystem::path file = std::filesystem::path(folder) / name;
+    std::error_code ignored;
+    if (!folder.empty() && std::filesystem::is_regular_file(file, ignored) &&
+        ::access(file.c_str(), X_OK) == 0) {
+      return file;
+    }
+  }
+  return std::nullopt;
 }
 
 physics::Result<std::filesystem::path> executable_dir() {

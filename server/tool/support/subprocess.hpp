@@ -41,6 +41,9 @@ class Subprocess {
   std::optional<int> status_;
 };
 
+/// Returns the first program of that name in the folders of PATH; empty if there is none.
+[[nodiscard]] std::optional<std::filesystem::path> find_program(const std::string& name);
+
 /// Returns the folder of the running executable. Errors: io.
 [[nodiscard]] physics::Result<std::filesystem::path> executable_dir();
 

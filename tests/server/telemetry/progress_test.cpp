@@ -15,65 +15,82 @@ namespace {
 
 using emit::test::kSecondNs;
 
-/// Progress whose clock and output are the test's.
+/// Progress whose clock and terminal are the test's.
 struct Rig {
-  explicit Rig(bool terminal, std::uint64_t total = 100)
+  explicit Rig(std::uint64_t total = 100)
       : progress("warm-up", total, clock,
-                 {terminal, [this](std::string_view text) { written.emplace_back(text); }}) {}
+                 [this](std::string_view text) { written.emplace_back(text); }) {}
   test::FakeClock clock;
   std::vector<std::string> written;
   Progress progress;
 };
 
-TEST(Progress, a_log_gets_a_line_every_three_seconds_with_the_time_left) {
-  Rig rig(false);
-  for (std::uint64_t done = 1; done <= 99; ++done) {
-    rig.clock.advance(kSecondNs / 2);
-    rig.progress.advance_to(done);
+/// Lines that the daemon's log has of a work of `total` parts, each of which takes `part_ns`.
+std::vector<std::string> log_lines(std::uint64_t total, std::int64_t part_ns) {
+  test::FakeClock clock;
+  ProgressMeter meter(clock);
+  std::vector<std::string> lines;
+  for (std::uint64_t done = 1; done < total; ++done) {
+    clock.advance(part_ns);
+    if (const auto report = meter.due(static_cast<double>(done) / static_cast<double>(total))) {
+      lines.push_back(progress_text("warm-up", *report));
+    }
   }
-  ASSERT_EQ(rig.written.size(), 16U) << "49.5 s";
-  EXPECT_EQ(rig.written[0], "warm-up 6 %, about 47 s left\n");
-  EXPECT_EQ(rig.written[10], "warm-up 66 %, about 17 s left\n");
-  rig.clock.advance(kSecondNs / 2);
-  rig.progress.advance_to(100);
-  rig.progress.finish();
-  ASSERT_EQ(rig.written.size(), 17U);
-  EXPECT_EQ(rig.written.back(), "warm-up done after 50 s\n");
+  return lines;
 }
 
-TEST(Progress, short_work_leaves_a_log_alone) {
-  Rig rig(false);
-  for (const std::uint64_t done : {30U, 60U, 100U}) {
-    rig.clock.advance(kSecondNs * 9 / 10);
-    rig.progress.advance_to(done);
-  }
-  rig.progress.finish();
-  EXPECT_TRUE(rig.written.empty());
+TEST(ProgressMeter, a_log_gets_a_line_every_three_seconds_with_the_time_left) {
+  const std::vector<std::string> lines = log_lines(100, kSecondNs / 2);
+  ASSERT_EQ(lines.size(), 16U) << "49.5 s";
+  EXPECT_EQ(lines[0], "warm-up 6 %, about 47 s left");
+  EXPECT_EQ(lines[10], "warm-up 66 %, about 17 s left");
 }
 
-TEST(Progress, lines_of_a_work_of_hours_move_apart) {
-  Rig rig(false, 36'000);
-  for (std::uint64_t second = 1; second < 36'000; ++second) {
-    rig.clock.advance(kSecondNs);
-    rig.progress.advance_to(second);
-  }
-  EXPECT_GT(rig.written.size(), 100U);
-  EXPECT_LT(rig.written.size(), 400U) << "a line every three seconds would be 12000";
-  EXPECT_TRUE(std::ranges::any_of(rig.written, [](const std::string& line) {
-    return line.find(" h left\n") != std::string::npos;
-  }));
+TEST(ProgressMeter, short_work_leaves_a_log_alone) {
+  EXPECT_TRUE(log_lines(3, kSecondNs * 9 / 10).empty());
 }
 
-TEST(Progress, work_that_has_done_nothing_says_no_time) {
-  Rig rig(false);
-  rig.clock.advance(5 * kSecondNs);
-  rig.progress.advance_to(0);
-  ASSERT_EQ(rig.written.size(), 1U);
-  EXPECT_EQ(rig.written[0], "warm-up 0 %\n");
+TEST(ProgressMeter, lines_of_a_work_of_hours_move_apart) {
+  const std::vector<std::string> lines = log_lines(36'000, kSecondNs);
+  EXPECT_GT(lines.size(), 100U);
+  EXPECT_LT(lines.size(), 400U) << "a line every three seconds would be 12000";
+  EXPECT_TRUE(std::ranges::any_of(
+      lines, [](const std::string& line) { return line.ends_with(" h left"); }));
+}
+
+TEST(ProgressMeter, work_that_has_done_nothing_says_no_time) {
+  test::FakeClock clock;
+  ProgressMeter meter(clock);
+  clock.advance(5 * kSecondNs);
+  const auto report = meter.due(0.0);
+  ASSERT_TRUE(report.has_value());
+  EXPECT_EQ(progress_text("warm-up", *report), "warm-up 0 %");
+}
+
+TEST(Progress, without_a_terminal_nothing_is_written) {
+  testing::internal::CaptureStderr();  // a file, as in a log
+  {
+    Progress progress("warm-up", 100);
+    for (std::uint64_t done = 0; done <= 100; ++done) progress.advance_to(done);
+    progress.clear();
+  }
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+}
+
+TEST(Progress, lines_of_the_caller_find_the_terminal_clear) {
+  Rig rig;
+  rig.progress.advance_to(10);
+  rig.progress.clear();
+  ASSERT_EQ(rig.written.size(), 2U);
+  EXPECT_EQ(rig.written.back(), "\r\x1b[K");
+  rig.progress.clear();
+  EXPECT_EQ(rig.written.size(), 2U) << "there is no bar to take away";
+  rig.progress.advance_to(11);
+  EXPECT_NE(rig.written.back().find("11 %"), std::string::npos) << "drawn at once";
 }
 
 TEST(Progress, a_terminal_gets_a_bar_that_is_drawn_ten_times_a_second_and_cleared) {
-  Rig rig(true);
+  Rig rig;
   for (std::uint64_t done = 1; done <= 50; ++done) {
     rig.clock.advance(kSecondNs / 50);
     rig.progress.advance_to(done);
@@ -90,7 +107,7 @@ TEST(Progress, a_terminal_gets_a_bar_that_is_drawn_ten_times_a_second_and_cleare
 }
 
 TEST(Progress, more_parts_than_the_total_are_all_of_it) {
-  Rig rig(true, 0);
+  Rig rig(0);
   rig.progress.advance_to(7);
   ASSERT_EQ(rig.written.size(), 1U);
   EXPECT_NE(rig.written[0].find("100 %"), std::string::npos);

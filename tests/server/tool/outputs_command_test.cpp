@@ -74,6 +74,10 @@ const std::vector<OutputCase>& output_cases() {
     add({"inspect", "no.glb"}, {"--json"});
     add({"weather", "no.csv"}, {"--json", "--plot"});
     add({"materials"}, {"--json", "--plot"});
+    add({"probe", "box", "--at", "0,0,0", "--time-s", "0"}, {"--out", "--plot"});
+    add({"campaign", "no.toml", "--out", "GOOD"}, {"--json"}, {"--out"});
+    add({"scene", "check", "box"}, {"--json"});
+    add({"scene", "preview", "box", "--out", "GOOD"}, {"--out"});
     add({"man"}, {}, {"--out"});
     add({"completion", "bash"}, {"--out"});
     add({"bench", "paper"}, {"--json"});

@@ -3,7 +3,9 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <glm/ext/vector_double3.hpp>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -50,6 +52,8 @@ struct OutputOptions {
   bool temperature = false;  ///< surface temperature, K; NaN for sky
   bool depth = false;        ///< distance along the boresight, m; +Inf for sky
   bool object = false;       ///< 1 + index of the scenario's object, as float; 0 for sky
+  bool sun = false;  ///< visible share of the sun times the cosine of its incidence; NaN for sky
+  bool sky = false;  ///< cosine-weighted share of the hemisphere that shows sky; NaN for sky
   Ladder ladder = Ladder::none;
   std::uint32_t slots = 3;    ///< read-back slots, 2..16: frames in flight plus frames being sent
   bool stage_timing = false;  ///< fills FrameView::stages_ms; the renderer waits after each stage
@@ -134,6 +138,8 @@ struct FrameView {
   std::span<const float> temperature_k;                  ///< empty unless asked for
   std::span<const float> depth_m;                        ///< empty unless asked for
   std::span<const float> object_id;                      ///< empty unless asked for
+  std::span<const float> sun_cosine;                     ///< empty unless asked for
+  std::span<const float> sky_frac;                       ///< empty unless asked for
   FrameStats stats;
   std::uint8_t quality_level = 0;  ///< quality level that was rendered
   /// Expected difference from full quality: RMS of the apparent temperature over the image, K, in
@@ -142,6 +148,21 @@ struct FrameView {
   bool device_failed = false;  ///< the driver reported an error, and the pixels may be wrong
   bool device_lost = false;    ///< the context was reset, and nothing can be drawn with it any more
   StageTimes stages_ms;
+};
+
+/// Place on a surface at the instant of the latest frame.
+struct SurfacePlace {
+  glm::dvec3 position_world_m{0.0};
+  glm::dvec3 normal{0.0, 0.0, 1.0};  ///< outward, unit length, world axes
+};
+
+/// State of a thermal sample at the thermal instant of the latest frame.
+struct SampleReading {
+  glm::dvec3 position_world_m{0.0};
+  double temperature_k = 0.0;
+  /// Net flux into the solid, mean over the interval in which the renderer advances its heat. NaN
+  /// where no flux drives the heat: with emit2014 and prescribed temperatures.
+  double flux_w_m2 = 0.0;
 };
 
 /// Figures of the loaded scene.
@@ -208,6 +229,12 @@ class Renderer {
   /// from those of a new renderer. RT-safe.
   virtual void reset() noexcept = 0;
 
+  /// Names the thermal instants of frames that will follow by carry_on(). With thermal.method =
+  /// "cached" warm_up() then refines static surfaces also along the shadows that static geometry
+  /// casts at these instants, which takes time in proportion to their number. Setup only; call it
+  /// before warm_up().
+  virtual void plan(std::span<const std::int64_t> thermal_times_ns) = 0;
+
   /// Does the work that frames from `first` on need once. With thermal.method = "cached" it samples
   /// the surface and integrates its history, which takes seconds to minutes on all cores. Call it
   /// before the first frame; otherwise submit() does it, and does it again where sim time goes back
@@ -246,6 +273,15 @@ class Renderer {
   /// Pose of the sensor on the trajectory of the scenario; the default pose where it has none.
   [[nodiscard]] virtual physics::Pose scenario_sensor_pose_at(
       std::int64_t sim_time_ns) const noexcept = 0;
+
+  /// Finds the thermal sample nearest to a place among those whose face looks the same way (within
+  /// 30 degrees). The number stays valid until the next warm_up(). Empty: there is none, as always
+  /// with thermal.method = "per-frame". It looks at all samples: setup only.
+  [[nodiscard]] virtual std::optional<std::uint32_t> nearest_sample(
+      const SurfacePlace& place) const noexcept = 0;
+  /// Reads a sample. RT-safe.
+  /// @pre nearest_sample() returned the number.
+  [[nodiscard]] virtual SampleReading sample_reading(std::uint32_t sample) const noexcept = 0;
 
   /// Figures of the scene. They grow in warm_up().
   [[nodiscard]] virtual const SceneStats& scene_stats() const noexcept = 0;

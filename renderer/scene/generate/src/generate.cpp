@@ -196,4 +196,20 @@ Result<GeneratedFiles> generate(const GenerateOptions& options) {
   return files;
 }
 
+Result<GeneratedFile> generate_ground(const std::filesystem::path& file, double edge_m,
+                                      const std::string& material) {
+  if (!in_range(edge_m, 0.1, kMaxLengthM)) {
+    return make_error(ErrorCode::invalid_argument,
+                      fmt::format("ground of {} m: must be in [0.1, 1e5]", edge_m));
+  }
+  constexpr std::uint32_t kCells = 32;
+  const double h = 0.5 * edge_m;
+  MeshBuilder ground("ground");
+  ground.material(material);
+  ground.grid_quad({-h, -h, 0.0}, {h, -h, 0.0}, {h, h, 0.0}, {-h, h, 0.0}, kCells, kCells);
+  Scene scene;
+  scene.place(scene.add_mesh(ground.take()), "ground");
+  return write_glb(file, scene);
+}
+
 }  // namespace emit::scenegen

@@ -12,6 +12,7 @@
 
 #include "emit/physics/error.hpp"
 #include "emit/physics/frames.hpp"
+#include "emit/reference/nearest_surface.hpp"
 #include "emit/reference/solid_solver.hpp"
 #include "emit/scene/mesh.hpp"
 #include "emit/scene/scene_desc.hpp"
@@ -104,9 +105,6 @@ struct ProbedPoint {
   glm::dvec3 normal{0.0};
   std::uint32_t object = 0;  ///< index into ScenarioDesc::objects
 };
-/// Largest distance of a probe from the surface that it stands for.
-inline constexpr double kProbeReachM = 0.02;
-
 /// Solver of a scenario's history, with any number of images along it. Owner: the caller. Thread:
 /// one at a time.
 ///   auto solver = SceneSolver::create(scenario, geometry, options, last_ns);

@@ -90,4 +90,11 @@ struct GeneratedFiles {
 /// Thread: any.  Real time: setup only.
 [[nodiscard]] physics::Result<GeneratedFiles> generate(const GenerateOptions& options);
 
+/// Writes a level square of ground around the origin at height 0, cut into 32 x 32 cells, with one
+/// material. Errors: invalid_argument (`edge_m` is not in 0.1 .. 1e5 m), io. Thread: any. Real
+/// time: setup only.
+[[nodiscard]] physics::Result<GeneratedFile> generate_ground(const std::filesystem::path& file,
+                                                             double edge_m,
+                                                             const std::string& material);
+
 }  // namespace emit::scenegen
