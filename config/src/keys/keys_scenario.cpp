@@ -334,8 +334,8 @@ const KeyTable<AtmosphereDraft>& atmosphere_keys() {
                               "Water vapour of the built-in air, by that of its climate. Without "
                               "it: see Built-in air."),
       path<AtmosphereDraft>("file", EMIT_FIELD(file),
-                            "CSV file of the air (see Atmosphere tables). It comes before the "
-                            "model. Bands that a grid lacks need `model` written out."),
+                            "CSV or tape7 file of the air (see Atmosphere tables). It comes before "
+                            "the model. Bands that a table lacks need `model` written out."),
       custom<AtmosphereDraft>(
           {"band", "array of tables", "", "",
            "Terms or a table in this file, see `[[atmosphere.band]]`. They replace file and model "

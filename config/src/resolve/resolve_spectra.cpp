@@ -367,7 +367,7 @@ scene::AtmosphereDesc resolve_atmosphere(const Node& root, const scene::Scenario
   out.enabled = draft.enabled;
   std::vector<BandAtmosphere> from_file;
   if (!draft.file.empty()) {
-    auto loaded = load_atmosphere_csv(draft.file, speakable_band_names(root, bands));
+    auto loaded = load_atmosphere(draft.file, bands, speakable_band_names(root, bands));
     if (!loaded) {
       report_file_error(loaded.error(), table, "file", diagnostics);
     } else {

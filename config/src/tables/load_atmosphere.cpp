@@ -8,6 +8,7 @@
 #include "emit/physics/csv.hpp"
 #include "emit/physics/nearest_name.hpp"
 #include "tables.hpp"
+#include "tape7.hpp"
 #include "typed_table.hpp"
 
 /// Reader of atmospheres: a table by range and elevation, or the terms of a sum of exponentials.
@@ -215,7 +216,116 @@ Result<std::vector<BandAtmosphere>> load_table(const fs::path& file,
   return out;
 }
 
+/// Returns a text for a line of sight in messages.
+std::string sight_text(const Tape7Run& run) {
+  return fmt::format("elevation {:.4g} deg and range {:.6g} m", run.elevation_deg, run.range_m);
+}
+
+/// Picks the runs that a table can be made of, in the order of elevation and range. Runs without
+/// radiance may stand beside runs of the same line of sight that have it; else their path is level.
+Result<std::vector<const Tape7Run*>> pick_runs(const fs::path& file,
+                                               const std::vector<Tape7Run>& runs) {
+  const auto same = [](const Tape7Run& a, const Tape7Run& b) {
+    return std::abs(a.elevation_deg - b.elevation_deg) < 1e-3 &&
+           std::abs(a.range_m - b.range_m) < 1e-3 * a.range_m;
+  };
+  std::vector<const Tape7Run*> picked;
+  for (const Tape7Run& run : runs) {
+    if (std::abs(run.sensor_m - runs.front().sensor_m) > 1.0) {
+      return fault(file, run.line,
+                   fmt::format("this run is for a sensor at {} m, the one of line {} for {} m: a "
+                               "table holds for one height",
+                               run.sensor_m, runs.front().line, runs.front().sensor_m));
+    }
+    if (run.has_radiance) {
+      picked.push_back(&run);
+      continue;
+    }
+    const bool paired = std::ranges::any_of(
+        runs, [&](const Tape7Run& other) { return other.has_radiance && same(run, other); });
+    if (paired) continue;
+    if (!run.level_k) {
+      return fault(file, run.line,
+                   fmt::format("the run of {} has transmittances only, and its path is not level "
+                               "in a model atmosphere: run it with radiance (IEMSCT 1 or 2)",
+                               sight_text(run)));
+    }
+    picked.push_back(&run);
+  }
+  std::ranges::sort(picked, [](const Tape7Run* a, const Tape7Run* b) {
+    return a->elevation_deg != b->elevation_deg ? a->elevation_deg < b->elevation_deg
+                                                : a->range_m < b->range_m;
+  });
+  return picked;
+}
+
+Result<std::vector<BandAtmosphere>> load_runs(const fs::path& file,
+                                              const std::vector<scene::SpectralBand>& bands) {
+  const auto runs = load_tape7(file);
+  if (!runs) return tl::unexpected<physics::Error>(runs.error());
+  const auto picked = pick_runs(file, *runs);
+  if (!picked) return tl::unexpected<physics::Error>(picked.error());
+  // Paths out of the atmosphere have a range of their own each, and stand for the same column of
+  // the table. Other ranges may differ by what the cards are rounded to.
+  std::vector<double> ranges_m;
+  for (const Tape7Run* run : *picked) {
+    if (run->leaves_air) ranges_m.push_back(run->range_m);
+  }
+  const double out_m = ranges_m.empty() ? 0.0 : *std::ranges::max_element(ranges_m);
+  ranges_m.assign(ranges_m.empty() ? 0 : 1, out_m);
+  const auto range_of = [&](const Tape7Run& run) {
+    if (run.leaves_air) return out_m;
+    for (const double known_m : ranges_m) {
+      if (std::abs(known_m - run.range_m) < 1e-4 * known_m) return known_m;
+    }
+    return ranges_m.emplace_back(run.range_m);
+  };
+  std::vector<BandAtmosphere> out;
+  for (const scene::SpectralBand& band : bands) {
+    BandRows rows{band.name, {}};
+    const Tape7Run* lacking = nullptr;
+    for (const Tape7Run* run : *picked) {
+      const auto air = tape7_air(*run, band);
+      if (!air) {
+        lacking = run;
+        continue;
+      }
+      const TableRow row{run->line,
+                         {0.0, range_of(*run), run->elevation_deg, air->transmittance_frac,
+                          air->path_radiance_w_m2_sr},
+                         {}};
+      if (auto added = add_row(file, row, rows); !added) {
+        return tl::unexpected<physics::Error>(added.error());
+      }
+    }
+    // A file need not have all bands, but no part of one.
+    if (rows.by_elevation_deg.empty()) continue;
+    if (lacking != nullptr) {
+      return fault(file, lacking->line,
+                   fmt::format("the run of {} covers {} .. {} cm-1, which is not all of band '{}'",
+                               sight_text(*lacking), lacking->samples.front().wavenumber_per_cm,
+                               lacking->samples.back().wavenumber_per_cm, band.name));
+    }
+    auto grid = grid_of(file, rows);
+    if (!grid) return tl::unexpected<physics::Error>(grid.error());
+    out.push_back(std::move(*grid));
+  }
+  if (out.empty()) {
+    return fault(file, picked->front()->line,
+                 fmt::format("the run covers {} .. {} cm-1, which holds none of the bands",
+                             picked->front()->samples.front().wavenumber_per_cm,
+                             picked->front()->samples.back().wavenumber_per_cm));
+  }
+  return out;
+}
+
 }  // namespace
+
+Result<std::vector<BandAtmosphere>> load_atmosphere(const fs::path& file,
+                                                    const std::vector<scene::SpectralBand>& bands,
+                                                    const std::vector<std::string>& known_bands) {
+  return is_tape7(file) ? load_runs(file, bands) : load_atmosphere_csv(file, known_bands);
+}
 
 Result<std::vector<BandAtmosphere>> load_atmosphere_csv(
     const fs::path& file, const std::vector<std::string>& known_bands) {

@@ -23,6 +23,12 @@ namespace emit::config {
 [[nodiscard]] physics::Result<std::vector<scene::ResponseSample>> load_response_csv(
     const std::filesystem::path& file);
 
+/// Reads the air of `bands` from a file: CSV as below with bands of `known_bands`, or output of
+/// MODTRAN (tape7.hpp), which is integrated over those of `bands` that it covers.
+[[nodiscard]] physics::Result<std::vector<scene::BandAtmosphere>> load_atmosphere(
+    const std::filesystem::path& file, const std::vector<scene::SpectralBand>& bands,
+    const std::vector<std::string>& known_bands);
+
 /// Reads a table of the air or the terms of a model; the header row says which
 /// (load_atmosphere.cpp).
 [[nodiscard]] physics::Result<std::vector<scene::BandAtmosphere>> load_atmosphere_csv(

@@ -50,7 +50,8 @@ std::vector<Interval> lay_out(const WeatherYear& year, std::int64_t epoch_utc_ns
     first_of_day[{year.records[i].month, year.records[i].day}] = i;
   }
   const auto zone_ns = std::llround(year.zone_h * kHourNs);
-  const auto local = sys_time<nanoseconds>(nanoseconds(epoch_utc_ns + zone_ns));
+  const auto local =
+      sys_time<std::chrono::nanoseconds>(std::chrono::nanoseconds(epoch_utc_ns + zone_ns));
   const auto today = floor<days>(local);
   std::vector<Interval> out;
   out.reserve(per_day * (2 * kDaysAround + 1));
@@ -65,7 +66,8 @@ std::vector<Interval> lay_out(const WeatherYear& year, std::int64_t epoch_utc_ns
     }
     if (found == first_of_day.end()) continue;
     const std::int64_t begin_ns =
-        duration_cast<nanoseconds>(begin.time_since_epoch()).count() - zone_ns - epoch_utc_ns;
+        duration_cast<std::chrono::nanoseconds>(begin.time_since_epoch()).count() - zone_ns -
+        epoch_utc_ns;
     for (std::size_t k = 0; k < per_day; ++k) {
       out.push_back({found->second + k,
                      begin_ns + std::llround(static_cast<double>(k) * year.record_h * kHourNs)});
@@ -285,7 +287,8 @@ void warn_of_year(const WeatherYear& year, const std::string& name,
   const int first = year.records.front().year;
   const bool is_typical = std::any_of(year.records.begin(), year.records.end(),
                                       [&](const YearRecord& r) { return r.year != first; });
-  const auto epoch = floor<days>(sys_time<nanoseconds>(nanoseconds(scenario.epoch_utc_ns)));
+  const auto epoch = floor<days>(
+      sys_time<std::chrono::nanoseconds>(std::chrono::nanoseconds(scenario.epoch_utc_ns)));
   const int wanted = static_cast<int>(year_month_day(epoch).year());
   if (is_typical || first == wanted) return;
   warnings.push_back(
