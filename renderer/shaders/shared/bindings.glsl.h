@@ -59,7 +59,7 @@
 #define EMIT_MAX_MODES 2
 #define EMIT_MAX_ATMOSPHERE_TERMS 4
 #define EMIT_MAX_TAPS 256
-#define EMIT_MAX_MATERIALS 16384  // passes/surface_texel.glsl keeps 14 bits
+#define EMIT_MAX_MATERIALS 4096  // passes/surface_texel.glsl keeps 12 bits
 
 // Boresight distance that the geometry buffer holds for a pixel without a surface.
 #define EMIT_SKY_DEPTH_M 1e30f
