@@ -56,7 +56,7 @@ constexpr std::int64_t kShortHistoryNs = 12'600'000'000'000;
 
 /// Keys of [weather] beside `file` and `sample`: parameters of the clear-sky models.
 bool is_clear_sky_key(std::string_view key) {
-  return key != "file" && key != "sample" &&
+  return key != "file" && key != "sample" && !key.starts_with("cloud_base_") &&
          std::any_of(weather_keys().begin(), weather_keys().end(),
                      [key](const auto& known) { return known.spec.name == key; });
 }

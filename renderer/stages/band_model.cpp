@@ -8,6 +8,9 @@
 
 #include "emit/physics/band_radiance_lut.hpp"
 #include "emit/physics/clear_sky.hpp"
+#include "emit/physics/climate.hpp"
+#include "emit/physics/sky_state.hpp"
+#include "emit/scene/base.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -166,6 +169,7 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
     // Compute the constants of sun and sky.
     entry.sun_outside_w_m2 = sun_outside_w_m2(desc, entry.band);
     entry.sky_hemisphere_frac = sky_hemisphere_frac(entry.vertical_transmittance_frac);
+    entry.has_sky = atmosphere != nullptr;
     model.nodes_per_band_ = static_cast<std::uint32_t>(lut->nodes().size());
     model.tables_.insert(model.tables_.end(), lut->nodes().begin(), lut->nodes().end());
     model.params_.push_back(params);
@@ -173,6 +177,11 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
   }
   model.place_m_ = scenario.place.height_m;
   model.turbidity_ = scenario.clear_sky.linke_turbidity;
+  model.cloud_base_ = scenario.clear_sky.cloud_base;
+  // Weather tables state no humidity.
+  model.dew_point_k_ = scenario.weather.empty()
+                           ? scenario.clear_sky.dew_point_k
+                           : physics::usual_dew_point_k(scene::mean_air_k(scenario));
   if (auto views = model.build_views(scenario); !views) return tl::unexpected(views.error());
   // Append the tables of the air behind those of the bands.
   for (std::size_t i = 0; i < model.entries_.size(); ++i) {
@@ -221,6 +230,8 @@ void BandModel::update(const physics::Forcing& forcing, const physics::SunPositi
                                      physics::beam_share_frac(forcing.direct_normal_w_m2, sun,
                                                               physics::Metres(place_m_), turbidity_)
                                : 0.0;
+  const physics::SkyState sky_now = physics::sky_state(
+      forcing.longwave_down_w_m2, forcing.air_k, dew_point_k_, forcing.cloud_frac, cloud_base_);
   const double sin_sun = std::sin(sun.elevation.value());
   const double sin_shown = std::sin(physics::apparent_elevation(sun.elevation).value());
   for (std::size_t i = 0; i < entries_.size(); ++i) {
@@ -233,22 +244,39 @@ void BandModel::update(const physics::Forcing& forcing, const physics::SunPositi
     params.surroundings_radiance_w_m2_sr = static_cast<float>(
         physics::band_radiance(entry.band, physics::Kelvin(forcing.environment_k))
             .radiance_w_m2_sr);
-    double sky_w_m2_sr = air_w_m2_sr * entry.sky_hemisphere_frac;
+    const double cover_frac = entry.has_sky ? sky_now.cloud_cover_frac : 0.0;
+    const double cloud_w_m2_sr =
+        physics::band_radiance(entry.band, physics::Kelvin(sky_now.cloud_k)).radiance_w_m2_sr;
+    const double sky_air_w_m2_sr =
+        physics::band_radiance(entry.band, physics::Kelvin(forcing.air_k + sky_now.warmer_k))
+            .radiance_w_m2_sr;
+    params.sky_air_radiance_w_m2_sr = static_cast<float>((1.0 - cover_frac) * sky_air_w_m2_sr);
+    params.cloud_radiance_w_m2_sr = static_cast<float>(cover_frac * cloud_w_m2_sr);
+    params.clear_sky_frac = static_cast<float>(1.0 - cover_frac);
+    double clear_w_m2_sr = sky_air_w_m2_sr * entry.sky_hemisphere_frac;
     double sun_transmittance_frac = std::pow(entry.vertical_transmittance_frac, air_mass);
     if (entry.view) {
       // The place's air differs from that of the climate, and the difference fades upwards.
       const double warmer_k =
           (forcing.air_k - entry.climate_k) * std::exp(place_m_ / physics::BandAir::kWarmthScaleM);
+      const physics::AirView::Weather weather{
+          .warmer_k = warmer_k,
+          .sky_warmer_k =
+              warmer_k + sky_now.warmer_k * std::exp(place_m_ / physics::BandAir::kWarmthScaleM),
+          .cloud_cover_frac = sky_now.cloud_cover_frac,
+          .cloud_base_m = place_m_ + sky_now.cloud_base_m,
+          .cloud_radiance_w_m2_sr = cloud_w_m2_sr};
       entry.view->at(
-          sensor_m, warmer_k,
+          sensor_m, weather,
           std::span(air_nodes_).subspan(params.air_view_first, physics::AirView::kNodes));
-      sky_w_m2_sr = entry.view->sky_mean_w_m2_sr(place_m_, warmer_k);
+      clear_w_m2_sr = entry.view->clear_sky_mean_w_m2_sr(place_m_, weather.sky_warmer_k);
       sun_transmittance_frac = entry.view->sun_transmittance_frac(place_m_, sin_shown);
     } else if (entry.air) {
-      sky_w_m2_sr = entry.air_hemisphere_w_m2_sr;
+      clear_w_m2_sr = entry.air_hemisphere_w_m2_sr;
       sun_transmittance_frac = entry.air->out(sin_sun).transmittance_frac;
     }
-    params.sky_hemisphere_w_m2_sr = static_cast<float>(sky_w_m2_sr);
+    params.sky_hemisphere_w_m2_sr =
+        static_cast<float>((1.0 - cover_frac) * clear_w_m2_sr + cover_frac * cloud_w_m2_sr);
     params.sun_irradiance_w_m2 =
         static_cast<float>(entry.sun_outside_w_m2 / (sun.distance_au * sun.distance_au) *
                            beam_frac * sun_transmittance_frac);

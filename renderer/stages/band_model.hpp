@@ -67,6 +67,7 @@ class BandModel {
     std::optional<physics::AirView> view = std::nullopt;         ///< built-in air
     double climate_k = 0.0;       ///< air temperature of the climate at the ground of the place
     double sun_outside_w_m2 = 0;  ///< in band, normal to the sun, at 1 au
+    bool has_sky = false;         ///< false: a band without air shows no sky
   };
   /// Makes the views of the bands with built-in air.
   [[nodiscard]] physics::Result<void> build_views(const scene::ScenarioDesc& scenario);
@@ -77,6 +78,8 @@ class BandModel {
   std::vector<physics::AirView::Node> air_nodes_;
   double place_m_ = 0.0;  ///< height of the world's origin above sea level
   double turbidity_ = 0.0;
+  double dew_point_k_ = 0.0;
+  physics::CloudBase cloud_base_;
   std::uint32_t air_model_ = 0;
   std::uint32_t air_terms_ = 0;
   std::uint32_t air_table_ = 0;

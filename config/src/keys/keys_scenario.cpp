@@ -152,7 +152,16 @@ const KeyTable<WeatherDraft>& weather_keys() {
                            kDegree),
       number<WeatherDraft>("cloud_frac", "", between(limits::kCloudFrac),
                            EMIT_FIELD(clear_sky.cloud_frac),
-                           "Clear-sky models: share of the direct sun that clouds take."),
+                           "Clear-sky models: share of the direct sun that clouds take, and of "
+                           "the sky that they cover."),
+      number<WeatherDraft>("cloud_base_m", "m", between(0, 12000),
+                           EMIT_FIELD(clear_sky.cloud_base.height_m),
+                           "Height of the clouds' base above the ground. Without it and "
+                           "`cloud_base_k` the base is at 0.941 of the air's temperature."),
+      number<WeatherDraft>("cloud_base_k", "K", between(150, 330),
+                           EMIT_FIELD(clear_sky.cloud_base.kelvin),
+                           "Temperature of the clouds' base. Without it that of air that cools by "
+                           "6.5 K/km up to the base."),
       custom<WeatherDraft>(
           {"sample", "array of tables", "", "", "Weather in this file, see `[[weather.sample]]`.",
            false},

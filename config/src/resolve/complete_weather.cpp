@@ -129,7 +129,7 @@ double fit_cloud_frac(std::span<const WeatherSample> rows, const ModelSky& sky, 
 }
 
 /// The dew point for which the sky's emissivity gives the table's long-wave irradiance: the inverse
-/// of physics::sky_emissivity_frac() within its range of 230 to 310 K.
+/// of physics::sky_longwave_w_m2() within its range of 230 to 310 K.
 double fit_dew_point_k(std::span<const WeatherSample> rows, const ClearSky& model) {
   double black_w_m2 = 0.0;
   for (const WeatherSample& row : rows) {
@@ -141,7 +141,10 @@ double fit_dew_point_k(std::span<const WeatherSample> rows, const ClearSky& mode
   double hi_k = std::clamp(model.air_mean_k + model.air_amplitude_k, lo_k, 310.0);
   for (int i = 0; i < 50; ++i) {
     const double mid_k = 0.5 * (lo_k + hi_k);
-    const double frac = physics::sky_emissivity_frac(physics::Kelvin(mid_k), model.cloud_frac);
+    const double frac =
+        physics::sky_longwave_w_m2(physics::Kelvin(model.air_mean_k), physics::Kelvin(mid_k),
+                                   model.cloud_frac, model.cloud_base) /
+        (physics::kStefanBoltzmannWPerM2K4 * std::pow(model.air_mean_k, 4.0));
     (frac < measured_frac ? lo_k : hi_k) = mid_k;
   }
   return 0.5 * (lo_k + hi_k);

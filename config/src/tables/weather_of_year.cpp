@@ -97,15 +97,17 @@ void fill(std::vector<YearRecord>& records, std::optional<double> YearRecord::*m
   }
 }
 
-void fill_longwave(std::vector<YearRecord>& records, Filled& filled) {
+void fill_longwave(std::vector<YearRecord>& records, const physics::CloudBase& base,
+                   Filled& filled) {
   for (YearRecord& record : records) {
     if (record.longwave_down_w_m2) continue;
     // Air of unknown humidity is taken as half saturated: its dew point is 10 K below at 293 K.
     constexpr double kUsualDepressionK = 10.0;
     const double dew_k =
         std::clamp(record.dew_point_k.value_or(*record.air_k - kUsualDepressionK), 230.0, 310.0);
-    record.longwave_down_w_m2 = physics::sky_longwave_w_m2(
-        physics::Kelvin(*record.air_k), physics::Kelvin(dew_k), record.cloud_frac.value_or(0.0));
+    record.longwave_down_w_m2 =
+        physics::sky_longwave_w_m2(physics::Kelvin(*record.air_k), physics::Kelvin(dew_k),
+                                   record.cloud_frac.value_or(0.0), base);
     ++filled.longwave;
   }
 }
@@ -306,7 +308,7 @@ std::vector<WeatherSample> weather_of_year(const WeatherYear& given, const std::
                             &YearRecord::cloud_frac}) {
     fill(year.records, member, filled.values);
   }
-  fill_longwave(year.records, filled);
+  fill_longwave(year.records, scenario.clear_sky.cloud_base, filled);
   const std::vector<Interval> intervals = lay_out(year, scenario.epoch_utc_ns);
   const auto record_ns = std::llround(year.record_h * kHourNs);
   std::vector<WeatherSample> out;

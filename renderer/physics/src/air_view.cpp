@@ -153,19 +153,26 @@ float AirView::radiance_at(const Place& place, std::size_t node) noexcept {
   return std::exp(low + place.fraction * (logarithm(place.high[node]) - low));
 }
 
-void AirView::at(double sensor_m, double warmer_k, std::span<Node> out) const noexcept {
+void AirView::at(double sensor_m, const Weather& weather, std::span<Node> out) const noexcept {
   EMIT_DCHECK(out.size() == kNodes);
-  const Place place = place_of(sensor_m, warmer_k);
+  constexpr std::size_t kSky = kHeights * kRanges;
+  const Place place = place_of(sensor_m, weather.warmer_k);
+  const Place sky = place_of(sensor_m, weather.sky_warmer_k);
   for (std::size_t i = 0; i < kNodes; ++i) {
     for (std::size_t k = 0; k < 3; ++k) {
       const float low = place.low[i].air[k];
       out[i][k] = low + place.fraction * (place.high[i].air[k] - low);
     }
-    out[i][3] = radiance_at(place, i);
+    out[i][3] = radiance_at(i < kSky ? place : sky, i);
   }
+  // Cover a share of the sky with clouds.
+  if (weather.cloud_base_m <= sensor_m) return;
+  const auto cover = static_cast<float>(weather.cloud_cover_frac);
+  const auto cloud = static_cast<float>(weather.cloud_radiance_w_m2_sr);
+  for (std::size_t i = kSky; i < kNodes; ++i) out[i][3] += cover * (cloud - out[i][3]);
 }
 
-double AirView::sky_mean_w_m2_sr(double height_m, double warmer_k) const noexcept {
+double AirView::clear_sky_mean_w_m2_sr(double height_m, double warmer_k) const noexcept {
   static const std::array<float, kElevations> kShare = sky_shares();
   const Place place = place_of(height_m, warmer_k);
   double sum = 0.0;

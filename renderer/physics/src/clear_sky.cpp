@@ -12,6 +12,10 @@ namespace {
 // The disc is wholly set below this elevation; the air mass formula ends a few degrees lower.
 constexpr double kLowestElevationDeg = -2.0;
 
+constexpr double kCloudTerm = 0.784;  // of eq. 12
+constexpr double kCloudLapseKPerM = 0.0065;
+constexpr double kColdestCloudK = 200.0;
+
 }  // namespace
 
 double relative_air_mass(Radians elevation) noexcept {
@@ -76,12 +80,26 @@ Radians apparent_elevation(Radians airless) noexcept {
 double sky_emissivity_frac(Kelvin dew_point, double cloud_frac) noexcept {
   const double x = (dew_point.value() - kZeroCelsiusK) / 100.0;
   const double clear = std::min(1.0, 0.758 + x * (0.521 + x * 0.625));
-  return clear + 0.784 * (1.0 - clear) * std::clamp(cloud_frac, 0.0, 1.0);
+  return clear + kCloudTerm * (1.0 - clear) * std::clamp(cloud_frac, 0.0, 1.0);
 }
 
-double sky_longwave_w_m2(Kelvin air, Kelvin dew_point, double cloud_frac) noexcept {
-  const double t2 = air.value() * air.value();
-  return sky_emissivity_frac(dew_point, cloud_frac) * kStefanBoltzmannWPerM2K4 * t2 * t2;
+double cloud_base_k(const CloudBase& base, double air_k) noexcept {
+  if (base.kelvin) return *base.kelvin;
+  if (base.height_m) return std::max(kColdestCloudK, air_k - kCloudLapseKPerM * *base.height_m);
+  return std::pow(kCloudTerm, 0.25) * air_k;
+}
+
+double cloud_base_m(const CloudBase& base, double air_k) noexcept {
+  if (base.height_m) return *base.height_m;
+  return std::max(0.0, (air_k - cloud_base_k(base, air_k)) / kCloudLapseKPerM);
+}
+
+double sky_longwave_w_m2(Kelvin air, Kelvin dew_point, double cloud_frac,
+                         const CloudBase& base) noexcept {
+  const double clear = sky_emissivity_frac(dew_point, 0.0);
+  const double cloud = std::pow(cloud_base_k(base, air.value()) / air.value(), 4.0);
+  const double emissivity = clear + cloud * (1.0 - clear) * std::clamp(cloud_frac, 0.0, 1.0);
+  return emissivity * kStefanBoltzmannWPerM2K4 * std::pow(air.value(), 4.0);
 }
 
 Kelvin daily_air_temperature(double solar_hours, Kelvin mean, Kelvin amplitude) noexcept {

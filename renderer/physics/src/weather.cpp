@@ -79,7 +79,8 @@ Forcing forcing_from_clear_sky(const ClearSky& model, const GeoPlace& place, con
   Forcing f;
   f.direct_normal_w_m2 = solar.direct_normal_w_m2;
   f.diffuse_horizontal_w_m2 = solar.diffuse_horizontal_w_m2;
-  f.longwave_down_w_m2 = sky_longwave_w_m2(air, Kelvin(model.dew_point_k), model.cloud_frac);
+  f.longwave_down_w_m2 =
+      sky_longwave_w_m2(air, Kelvin(model.dew_point_k), model.cloud_frac, model.cloud_base);
   f.air_k = air.value();
   f.environment_k = air.value();
   f.wind_m_s = model.wind_m_s;

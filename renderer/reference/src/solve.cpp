@@ -13,9 +13,11 @@
 #include <numeric>
 #include <optional>
 
+#include "emit/physics/climate.hpp"
 #include "emit/physics/weather.hpp"
 #include "emit/reference/surface_forcing.hpp"
 #include "emit/reference/visibility.hpp"
+#include "emit/scene/base.hpp"
 #include "emit/threads/parallel.hpp"
 #include "solve_checkpoint.hpp"
 #include "solve_points.hpp"
@@ -367,9 +369,15 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
                                 physics::Metres(scenario.place.height_m)};
   const physics::SunPosition sun =
       physics::sun_position(scenario.epoch_utc_ns + view.sim_time_ns, place);
-  const double beam_frac = (1.0 - cloud_frac_at(scenario, view.sim_time_ns)) *
-                           physics::beam_share_frac(now.direct_normal_w_m2, sun, place.height,
+  const double cloud_frac = cloud_frac_at(scenario, view.sim_time_ns);
+  const double beam_frac =
+      (1.0 - cloud_frac) * physics::beam_share_frac(now.direct_normal_w_m2, sun, place.height,
                                                     scenario.clear_sky.linke_turbidity);
+  const double dew_point_k = scenario.weather.empty()
+                                 ? scenario.clear_sky.dew_point_k
+                                 : physics::usual_dew_point_k(scene::mean_air_k(scenario));
+  const physics::SkyState sky_now = sky_by_bisection(now.longwave_down_w_m2, now.air_k, dew_point_k,
+                                                     cloud_frac, scenario.clear_sky.cloud_base);
   const double sensor_m = view.sensor_pose.position_world_m.z;
   std::vector<double> face_k;
   if (solid) {
@@ -378,7 +386,7 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
   }
   for (std::size_t b = 0; b < bands.size(); ++b) {
     BandRadiance& band = bands[b];
-    band.set_air(now.air_k, sun, beam_frac);
+    band.set_air(now.air_k, sun, beam_frac, sky_now);
     // Compute the radiance that every patch sends out.
     const double around = band.black(now.surroundings_k);
     std::vector<double> patch;

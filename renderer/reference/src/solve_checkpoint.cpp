@@ -108,7 +108,7 @@ SolveFingerprint fingerprint(const scene::ScenarioDesc& scenario,
                          sky.wind_m_s, sky.cloud_frac}) {
     weather.add(v);
   }
-  weather.add(sky.wind_from_rad);
+  weather.add(sky.wind_from_rad).add(sky.cloud_base.height_m).add(sky.cloud_base.kelvin);
   for (const scene::WeatherSample& w : scenario.weather) {
     weather.add(w.sim_time_ns).add(w.direct_normal_w_m2).add(w.diffuse_horizontal_w_m2);
     weather.add(w.longwave_down_w_m2).add(w.air_k).add(w.wind_m_s).add(w.cloud_frac);

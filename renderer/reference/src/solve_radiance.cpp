@@ -65,6 +65,45 @@ double BandIntegral::radiance_w_m2_sr(double kelvin) const {
   return sum;
 }
 
+physics::SkyState sky_by_bisection(double longwave_down_w_m2, double air_k, double dew_point_k,
+                                   double cloud_frac, const physics::CloudBase& base) {
+  const auto black = [](double kelvin) {
+    return physics::kStefanBoltzmannWPerM2K4 * std::pow(kelvin, 4.0);
+  };
+  // Returns where a rising function meets the irradiance, or the nearer end.
+  const auto meet = [&](double low, double high, const auto& sent) {
+    for (int i = 0; i < 80; ++i) {
+      const double middle = 0.5 * (low + high);
+      (sent(middle) < longwave_down_w_m2 ? low : high) = middle;
+    }
+    return 0.5 * (low + high);
+  };
+  const double dew_c = dew_point_k - physics::kZeroCelsiusK;
+  const double emissivity = std::min(1.0, 0.758 + 5.21e-3 * dew_c + 6.25e-5 * dew_c * dew_c);
+  const double clear = emissivity * black(air_k);
+  const double clear_k = air_k * std::pow(emissivity, 0.25);
+  const double under_base = clear + (1.0 - emissivity) * black(physics::cloud_base_k(base, air_k));
+  physics::SkyState sky;
+  sky.cloud_cover_frac = std::max(
+      cloud_frac, meet(0.0, 1.0, [&](double n) { return (1.0 - n) * clear + n * under_base; }));
+  const double n = sky.cloud_cover_frac;
+  const auto sent = [&](double cloud_k) { return (1.0 - n) * clear + n * black(cloud_k); };
+  sky.cloud_k = meet(clear_k, 3.0 * air_k, sent);
+  const double warmth = std::pow(std::max(longwave_down_w_m2 / sent(sky.cloud_k), 1e-8), 0.25);
+  sky.warmer_k = air_k * (warmth - 1.0);
+  // Clouds that send more or less than those of the stated base hang elsewhere.
+  sky.cloud_base_m = physics::cloud_base_m(base, air_k);
+  if (!base.height_m && emissivity < 1.0) {
+    const double base4 = (black(sky.cloud_k) - clear) / (1.0 - emissivity);
+    const double base_k =
+        std::min(air_k, std::pow(std::max(base4, 0.0) / physics::kStefanBoltzmannWPerM2K4, 0.25));
+    sky.cloud_base_m =
+        std::max(physics::kLowestInferredBaseM, physics::cloud_base_m({.kelvin = base_k}, air_k));
+  }
+  sky.cloud_k *= warmth;
+  return sky;
+}
+
 physics::Result<BandRadiance> BandRadiance::create(const scene::ScenarioDesc& scenario,
                                                    std::size_t band) {
   BandRadiance out(scenario.bands[band]);
@@ -72,6 +111,7 @@ physics::Result<BandRadiance> BandRadiance::create(const scene::ScenarioDesc& sc
   if (scenario.atmosphere.enabled) {
     for (const scene::BandAtmosphere& entry : scenario.atmosphere.bands) {
       if (entry.band != out.name_) continue;
+      out.has_air_ = true;
       if (entry.model) {
         auto column = physics::AirColumn::build(*entry.model);
         out.air_terms_ = physics::BandAir::find(out.name_);
@@ -96,13 +136,6 @@ physics::Result<BandRadiance> BandRadiance::create(const scene::ScenarioDesc& sc
       break;
     }
   }
-  // Average the sky's emissivity by the midpoint rule over elevation, weight 2 sin cos.
-  constexpr int kRings = 2000;
-  for (int i = 0; i < kRings; ++i) {
-    const double elevation = (i + 0.5) / kRings * physics::kPi / 2.0;
-    out.sky_share_ += (1.0 - std::pow(out.vertical_frac_, air_mass(std::sin(elevation)))) *
-                      std::sin(2.0 * elevation) * physics::kPi / 2.0 / kRings;
-  }
   out.place_m_ = scenario.place.height_m;
   const auto built_in = scenario.bands[band].response.empty() ? physics::BandAir::find(out.name_)
                                                               : std::optional<physics::BandAir>();
@@ -112,31 +145,34 @@ physics::Result<BandRadiance> BandRadiance::create(const scene::ScenarioDesc& sc
   return out;
 }
 
-void BandRadiance::set_air(double air_k, const physics::SunPosition& sun, double beam_frac) {
-  // The sky radiates like air of the opacity along its direction.
+void BandRadiance::set_air(double air_k, const physics::SunPosition& sun, double beam_frac,
+                           const physics::SkyState& sky_now) {
   air_ = black(air_k);
+  sky_now_ = sky_now;
+  sky_air_ = black(air_k + sky_now.warmer_k);
+  cloud_ = black(sky_now.cloud_k);
   const double sin_sun = std::sin(sun.elevation.value());
   double through = 0.0;
   if (column_) {
-    warmer_k_ = (air_k - column_->at(place_m_).kelvin) *
-                std::exp(place_m_ / physics::BandAir::kWarmthScaleM);
-    // Average the sky by the midpoint rule over the elevation, weight 2 sin cos.
-    constexpr int kRings = 400;
-    sky_mean_ = 0.0;
-    for (int i = 0; i < kRings; ++i) {
-      const double elevation = (i + 0.5) / kRings * physics::kPi / 2.0;
-      sky_mean_ +=
-          sky(0.0, std::sin(elevation)) * std::sin(2.0 * elevation) * physics::kPi / 2.0 / kRings;
-    }
+    const double to_sea_level = std::exp(place_m_ / physics::BandAir::kWarmthScaleM);
+    warmer_k_ = (air_k - column_->at(place_m_).kelvin) * to_sea_level;
+    sky_warmer_k_ = warmer_k_ + sky_now.warmer_k * to_sea_level;
     const double shown_rad = physics::apparent_elevation(sun.elevation).value();
     through = shown_rad > 0.0 ? air_terms_->transmittance(
                                     physics::AirPath::to_space(*column_, place_m_, shown_rad),
                                     physics::AirSource::sun_lowtran)
                               : 0.0;
   } else {
-    sky_mean_ = table_ ? table_->sky_hemisphere_w_m2_sr() : air_ * sky_share_;
     through = table_ ? table_->out(sin_sun).transmittance_frac
                      : std::pow(vertical_frac_, air_mass(sin_sun));
+  }
+  // Average the sky by the midpoint rule over the elevation, weight 2 sin cos.
+  const int rings = column_ ? 400 : 2000;
+  sky_mean_ = 0.0;
+  for (int i = 0; i < rings; ++i) {
+    const double elevation = (i + 0.5) / rings * physics::kPi / 2.0;
+    sky_mean_ +=
+        sky(0.0, std::sin(elevation)) * std::sin(2.0 * elevation) * physics::kPi / 2.0 / rings;
   }
   sun_w_m2_ = sun_outside_w_m2_ / (sun.distance_au * sun.distance_au) * beam_frac * through;
 }
@@ -188,13 +224,20 @@ double BandRadiance::at_aperture(const Leaving& leaving, double sensor_m, double
 }
 
 double BandRadiance::sky(double sensor_m, double sin_elevation) const {
+  if (!has_air_) return 0.0;
+  double clear_w_m2_sr = 0.0;
+  double cover = sky_now_.cloud_cover_frac;
   if (column_) {
     const auto path = physics::AirPath::to_space(*column_, place_m_ + sensor_m,
                                                  std::asin(std::clamp(sin_elevation, -1.0, 1.0)));
-    return air_terms_->path_radiance_w_m2_sr(path, warmer_k_);
+    clear_w_m2_sr = air_terms_->path_radiance_w_m2_sr(path, sky_warmer_k_);
+    if (sensor_m >= sky_now_.cloud_base_m) cover = 0.0;
+  } else if (table_) {
+    clear_w_m2_sr = table_->out(sin_elevation).path_radiance_w_m2_sr;
+  } else {
+    clear_w_m2_sr = sky_air_ * (1.0 - std::pow(vertical_frac_, air_mass(sin_elevation)));
   }
-  if (table_) return table_->out(sin_elevation).path_radiance_w_m2_sr;
-  return air_ * (1.0 - std::pow(vertical_frac_, air_mass(sin_elevation)));
+  return (1.0 - cover) * clear_w_m2_sr + cover * cloud_;
 }
 
 }  // namespace emit::reference

@@ -6,6 +6,7 @@
 #include "emit/physics/air_model.hpp"
 #include "emit/physics/atmosphere_table.hpp"
 #include "emit/physics/error.hpp"
+#include "emit/physics/sky_state.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/scene/scene_desc.hpp"
 
@@ -28,6 +29,13 @@ class BandIntegral {
   std::vector<Point> points_;
 };
 
+/// Returns the sky that sends a long-wave irradiance on level ground, by bisection over its cover
+/// and then over the temperature of its clouds. The renderer's physics::sky_state() has the closed
+/// form of the same sky.
+[[nodiscard]] physics::SkyState sky_by_bisection(double longwave_down_w_m2, double air_k,
+                                                 double dew_point_k, double cloud_frac,
+                                                 const physics::CloudBase& base);
+
 /// Radiance that leaves a surface and radiance that arrives at the camera, in one band. The stages
 /// are those of the renderer, with the scenario's atmosphere.
 class BandRadiance {
@@ -36,8 +44,10 @@ class BandRadiance {
   [[nodiscard]] static physics::Result<BandRadiance> create(const scene::ScenarioDesc& scenario,
                                                             std::size_t band);
 
-  /// Sets the air temperature, the sun and the share of a clear sky's direct sun that shines.
-  void set_air(double air_k, const physics::SunPosition& sun, double beam_frac);
+  /// Sets the air temperature, the sun, the share of a clear sky's direct sun that shines, and the
+  /// sky.
+  void set_air(double air_k, const physics::SunPosition& sun, double beam_frac,
+               const physics::SkyState& sky_now);
   /// Returns the in-band radiance of a blackbody, W m-2 sr-1.
   [[nodiscard]] double black(double kelvin) const { return integral_.radiance_w_m2_sr(kelvin); }
   /// Returns the emissivity of a material in this band.
@@ -69,9 +79,13 @@ class BandRadiance {
   std::optional<physics::AtmosphereTable> table_;
   std::optional<physics::AirColumn> column_;  ///< built-in air, with air_terms_
   std::optional<physics::BandAir> air_terms_;
-  double place_m_ = 0.0;    ///< height of the world's origin above sea level
-  double warmer_k_ = 0.0;   ///< air at sea level against that of the climate
-  double sky_share_ = 0.0;  ///< cosine-weighted mean of 1 - tau^m
+  double place_m_ = 0.0;       ///< height of the world's origin above sea level
+  double warmer_k_ = 0.0;      ///< air at sea level against that of the climate
+  double sky_warmer_k_ = 0.0;  ///< the same in the sky
+  physics::SkyState sky_now_;
+  bool has_air_ = false;
+  double cloud_ = 0.0;    ///< radiance of the clouds, W m-2 sr-1
+  double sky_air_ = 0.0;  ///< blackbody as warm as the air of the sky
   double air_ = 0.0;
   double sky_mean_ = 0.0;
   double sun_w_m2_ = 0.0;

@@ -92,7 +92,8 @@ float air_mass(float sin_elevation) {
 // Band radiance of the sky in W m-2 sr-1, for air that is a sum of exponential terms.
 float sky_radiance_w_m2_sr(uint band, float sin_elevation) {
   float log_vertical = log(max(bands[band].vertical_transmittance_frac, 1e-30));
-  return bands[band].air_radiance_w_m2_sr * (1.0 - exp(log_vertical * air_mass(sin_elevation)));
+  return bands[band].sky_air_radiance_w_m2_sr * (1.0 - exp(log_vertical * air_mass(sin_elevation))) +
+         bands[band].cloud_radiance_w_m2_sr;
 }
 
 // Transmittance of the air over a range, 0..1, as a sum of exponential terms.
@@ -174,7 +175,8 @@ void write_pixel(ivec2 px) {
     } else if ((EMIT_AIR_TABLE >> i & 1u) != 0u) {
       vec2 air = surface ? atmosphere_table_air(air_table(i), range_m, sin_elevation, clamped)
                          : atmosphere_table_out(air_table(i), sin_elevation, clamped);
-      radiance_w_m2_sr = air.x * radiance_w_m2_sr + air.y;
+      radiance_w_m2_sr = surface ? air.x * radiance_w_m2_sr + air.y
+                                 : bands[i].clear_sky_frac * air.y + bands[i].cloud_radiance_w_m2_sr;
     } else if ((EMIT_AIR_TERMS >> i & 1u) != 0u) {
       if (surface) {
         float tau = transmittance(i, range_m);

@@ -153,6 +153,10 @@ struct BandParams {
   uint air_table_ranges;
   uint air_table_elevations;            // 0: the band has no table of the air
   uint air_view_first;                  // index of the first node of the built-in air (lib/air_view.glsl)
+  float sky_air_radiance_w_m2_sr;       // blackbody as warm as the air of the sky, times the clear share
+  float cloud_radiance_w_m2_sr;         // of the clouds, times their cover
+  float clear_sky_frac;                 // share of the sky without clouds
+  uint unused0;
 };
 
 // Counters of one frame. Shaders add to them with atomics.
@@ -196,10 +200,11 @@ EMIT_SHARED_OFFSET(StepParams, film_end, 80 * EMIT_MAX_CASCADES + 128);
 EMIT_SHARED_OFFSET(StepParams, air_start_offset_k, 80 * EMIT_MAX_CASCADES + 192);
 EMIT_SHARED_OFFSET(StepParams, cascade_count, 80 * EMIT_MAX_CASCADES + 208);
 static_assert(sizeof(RelaxationParams) == 32);
-static_assert(sizeof(BandParams) == 80);
+static_assert(sizeof(BandParams) == 96);
 EMIT_SHARED_OFFSET(BandParams, air_radiance_w_m2_sr, 32);
 EMIT_SHARED_OFFSET(BandParams, sun_irradiance_w_m2, 48);
 EMIT_SHARED_OFFSET(BandParams, air_table_first, 64);
+EMIT_SHARED_OFFSET(BandParams, sky_air_radiance_w_m2_sr, 80);
 static_assert(sizeof(FrameStatsGpu) == 16);
 #endif
 

@@ -119,6 +119,8 @@ std::uint64_t weather_hash(const scene::ScenarioDesc& scenario) {
   add(hash, sky.linke_turbidity, sky.air_mean_k, sky.air_amplitude_k, sky.dew_point_k, sky.wind_m_s,
       sky.cloud_frac);
   add_optional(hash, sky.wind_from_rad);
+  add_optional(hash, sky.cloud_base.height_m);
+  add_optional(hash, sky.cloud_base.kelvin);
   return hash.value();
 }
 

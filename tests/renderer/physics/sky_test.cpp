@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 
 #include "emit/physics/clear_sky.hpp"
+#include "emit/physics/sky_state.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/physics/weather.hpp"
 #include "support/times.hpp"
@@ -140,6 +141,55 @@ TEST(ClearSky, LongwaveMatchesTheRecalibratedFormAndCloudsCloseTheWindow) {
   const double clear = sky_emissivity_frac(Kelvin(280.0), 0.0);
   EXPECT_NEAR(sky_emissivity_frac(Kelvin(280.0), 1.0), clear + 0.784 * (1.0 - clear), 1e-14);
   EXPECT_LE(sky_emissivity_frac(Kelvin(330.0), 1.0), 1.0);
+  // Clouds at the ground are as warm as the air, and then the sky is a blackbody.
+  const double black = kStefanBoltzmannWPerM2K4 * std::pow(293.15, 4.0);
+  EXPECT_NEAR(sky_longwave_w_m2(Kelvin(293.15), Kelvin(275.0), 1.0, {.height_m = 0.0}), black,
+              1e-9 * black);
+  // Clouds of no stated base are those of eq. 12.
+  EXPECT_NEAR(sky_longwave_w_m2(Kelvin(293.15), Kelvin(275.0), 0.7),
+              sky_emissivity_frac(Kelvin(275.0), 0.7) * black, 1e-9 * black);
+}
+
+TEST(SkyState, sends_the_irradiance_that_it_was_made_from) {
+  const double black = kStefanBoltzmannWPerM2K4 * std::pow(290.0, 4.0);
+  for (const CloudBase& base :
+       {CloudBase{}, CloudBase{.height_m = 300.0}, CloudBase{.kelvin = 265.0}}) {
+    const auto irradiance = [&base](double cover) {
+      return sky_longwave_w_m2(Kelvin(290.0), Kelvin(280.0), cover, base);
+    };
+    const double clear = irradiance(0.0);
+    for (const double stated_frac : {0.0, 0.4, 1.0}) {
+      for (double sent = 150.0; sent < 1.2 * black; sent += 7.0) {
+        const SkyState sky = sky_state(sent, 290.0, 280.0, stated_frac, base);
+        EXPECT_GE(sky.cloud_cover_frac, stated_frac);
+        EXPECT_LE(sky.cloud_cover_frac, 1.0);
+        const double clear_part = clear * std::pow(1.0 + sky.warmer_k / 290.0, 4.0);
+        const double cloud_part = kStefanBoltzmannWPerM2K4 * std::pow(sky.cloud_k, 4.0);
+        EXPECT_NEAR((1.0 - sky.cloud_cover_frac) * clear_part + sky.cloud_cover_frac * cloud_part,
+                    sent, 1e-9 * sent);
+        if (sent > clear) {
+          EXPECT_NEAR(sky.warmer_k, 0.0, 1e-9);
+        }
+      }
+    }
+    for (const double cover : {0.0, 0.3, 1.0}) {
+      const SkyState sky = sky_state(irradiance(cover), 290.0, 280.0, 0.0, base);
+      EXPECT_NEAR(sky.cloud_cover_frac, cover, 1e-12);
+      EXPECT_NEAR(sky.warmer_k, 0.0, 1e-9);
+      if (cover > 0.0) {
+        EXPECT_NEAR(sky.cloud_base_m, cloud_base_m(base, 290.0), 1e-6);
+      }
+    }
+    // An overcast sky has the temperature of its irradiance, whatever that is.
+    for (const double sent : {irradiance(1.0), black, 1.05 * black}) {
+      const SkyState sky = sky_state(sent, 290.0, 280.0, 0.0, base);
+      EXPECT_NEAR(sky.cloud_cover_frac, 1.0, 1e-12);
+      EXPECT_NEAR(sky.cloud_k, std::pow(sent / kStefanBoltzmannWPerM2K4, 0.25), 1e-9);
+    }
+  }
+  EXPECT_NEAR(sky_state(1.05 * black, 290.0, 280.0, 0.0, {}).cloud_base_m, 100.0, 1e-9);
+  EXPECT_GT(sky_state(0.0, 290.0, 280.0, 0.0, {}).warmer_k, -290.0);
+  EXPECT_GT(sky_state(0.0, 290.0, 280.0, 1.0, {}).cloud_k, 0.0);
 }
 
 TEST(ClearSky, AirIsWarmestAtThreeInTheAfternoon) {

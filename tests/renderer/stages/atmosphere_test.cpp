@@ -7,7 +7,10 @@
 #include <glm/geometric.hpp>
 
 #include "emit/physics/air_model.hpp"
+#include "emit/physics/apparent_temperature.hpp"
 #include "emit/physics/atmosphere_table.hpp"
+#include "emit/physics/clear_sky.hpp"
+#include "emit/physics/climate.hpp"
 #include "emit/physics/constants.hpp"
 #include "emit/physics/planck.hpp"
 #include "support/renderer_scene.hpp"
@@ -133,6 +136,10 @@ TEST(RendererAtmosphere, every_pixel_sees_built_in_air_between_the_heights_of_ca
     scenario.atmosphere.bands.push_back(air);
   }
   scenario.place.height_m = 150.0;
+  // The weather's long-wave irradiance is that of a clear sky.
+  scenario.weather[0].longwave_down_w_m2 = physics::sky_longwave_w_m2(
+      physics::Kelvin(scenario.weather[0].air_k),
+      physics::Kelvin(physics::usual_dew_point_k(scenario.weather[0].air_k)), 0.0);
   const auto column = physics::AirColumn::build(spec);
   ASSERT_TRUE(column) << column.error().text;
   const auto terms = physics::BandAir::find("8-12");
@@ -176,6 +183,152 @@ TEST(RendererAtmosphere, every_pixel_sees_built_in_air_between_the_heights_of_ca
     // of 300 K.
     EXPECT_LT(worst_surface, 0.02) << height_m;
     EXPECT_LT(worst_sky, 0.03) << height_m;
+  }
+}
+
+/// Overcast over a metal of emissivity 0.1 by night, in one band.
+scene::ScenarioDesc overcast(const scene::SpectralBand& band, double sky_k,
+                             const physics::CloudBase& base) {
+  auto scenario = instant_scenario(write_quads("wide_plane", {ground(20000.0, 20000.0)}));
+  scenario.bands = {{"3.4-4.1", 3.4, 4.1, {}}, band};
+  scenario.materials[0].prescribed_k = 310.0;
+  scenario.materials[0].emissivity_frac = 0.1;
+  scenario.atmosphere.enabled = true;
+  for (const auto& each : scenario.bands) {
+    scene::BandAtmosphere air;
+    air.band = each.name;
+    air.model = physics::AirSpec{physics::AirClimate::midlatitude_summer, 23.0, 1.0};
+    scenario.atmosphere.bands.push_back(air);
+  }
+  scenario.clear_sky.cloud_base = base;
+  scenario.weather[0].direct_normal_w_m2 = 0.0;
+  scenario.weather[0].longwave_down_w_m2 = physics::kStefanBoltzmannWPerM2K4 * std::pow(sky_k, 4.0);
+  return scenario;
+}
+
+TEST(RendererAtmosphere, an_overcast_sky_looks_as_warm_as_its_long_wave_irradiance) {
+  struct Case {
+    const char* name;
+    double sky_k;
+    double cloud_frac;
+    physics::CloudBase base;
+  };
+  // A low base; a sky that only clouds can be as warm as; one that eq. 12 would take for partly
+  // clear but whose weather states the clouds; and air above that is warmer than at the ground.
+  const double air_k = 295.0;
+  const double dew_k = physics::usual_dew_point_k(air_k);
+  const double low_w_m2 = physics::sky_longwave_w_m2(physics::Kelvin(air_k), physics::Kelvin(dew_k),
+                                                     1.0, {.height_m = 200.0});
+  const std::vector<Case> cases{{"low",
+                                 std::pow(low_w_m2 / physics::kStefanBoltzmannWPerM2K4, 0.25),
+                                 0.0,
+                                 {.height_m = 200.0}},
+                                {"usual", 293.5, 0.0, {}},
+                                {"stated", 288.0, 1.0, {}},
+                                {"inversion", 297.0, 0.0, {}}};
+  const std::vector<scene::SpectralBand> bands{{"3-5", 3.0, 5.0, {}}, {"8-12", 8.0, 12.0, {}}};
+  for (const scene::SpectralBand& band : bands) {
+    const auto black = [&band](double kelvin) {
+      return physics::band_radiance({band.lo_um, band.hi_um, {}}, physics::Kelvin(kelvin))
+          .radiance_w_m2_sr;
+    };
+    for (const Case& each : cases) {
+      SCOPED_TRACE(band.name + std::string(" ") + each.name);
+      auto scenario = overcast(band, each.sky_k, each.base);
+      scenario.weather[0].cloud_frac = each.cloud_frac;
+      const auto seen = [&](double up_m) {
+        const glm::dvec3 eye{0.0, -30.0, 4.0};
+        return render(scenario,
+                      {eye, physics::world_from_body_look_at(eye, {0.0, 0.0, 4.0 + up_m})});
+      };
+      // Every pixel of the sky is within 1 K of a sky of one temperature.
+      for (const float radiance : seen(30.0).radiance) {
+        ASSERT_GT(radiance, black(each.sky_k - 1.0));
+        ASSERT_LT(radiance, black(each.sky_k + 1.0));
+      }
+      // So is the apparent temperature of the metal that reflects it.
+      const physics::ApparentTemperature apparent({band.lo_um, band.hi_um, {}});
+      const double expected_k =
+          apparent.k(static_cast<float>(0.1 * black(310.0) + 0.9 * black(each.sky_k)));
+      const Frame down = seen(-30.0);
+      double worst_k = 0.0;
+      for (std::size_t i = 0; i < down.radiance.size(); ++i) {
+        ASSERT_FALSE(std::isinf(down.depth_m[i]));
+        worst_k = std::max(worst_k, std::abs(apparent.k(down.radiance[i]) - expected_k));
+      }
+      EXPECT_LT(worst_k, 1.0);
+      RecordProperty(band.name + each.name + std::string("_worst_mk"),
+                     std::to_string(1e3 * worst_k));
+    }
+  }
+}
+
+TEST(RendererAtmosphere, the_sky_over_all_wavelengths_sends_the_long_wave_irradiance) {
+  // Grey air: all bands together are the whole spectrum. Its emissivity is that of eq. 12.
+  auto scenario = instant_scenario(write_quads("plane", {ground(200.0, 200.0)}));
+  scenario.bands = {{"short", 0.5, 8.0, {}}, {"8-12", 8.0, 12.0, {}}, {"long", 12.0, 100.0, {}}};
+  const double air_k = scenario.weather[0].air_k;
+  const double dew_k = physics::usual_dew_point_k(air_k);
+  const double clear_frac = physics::sky_emissivity_frac(physics::Kelvin(dew_k), 0.0);
+  const auto hemisphere = [](double vertical_frac) {
+    double sum = 0.0;
+    for (int i = 0; i < 900; ++i) {
+      const double elevation = (i + 0.5) / 900.0 * physics::kPi / 2.0;
+      const double mass = physics::relative_air_mass(physics::Radians(elevation));
+      sum += (1.0 - std::pow(vertical_frac, mass)) * std::sin(2.0 * elevation) * physics::kPi /
+             2.0 / 900.0;
+    }
+    return sum;
+  };
+  double low = 0.0;
+  double high = 1.0;
+  for (int i = 0; i < 50; ++i) {
+    const double middle = 0.5 * (low + high);
+    (hemisphere(middle) > clear_frac ? low : high) = middle;
+  }
+  scenario.atmosphere.enabled = true;
+  for (const auto& band : scenario.bands) {
+    scene::BandAtmosphere air;
+    air.band = band.name;
+    air.terms = {{1.0, 1e-4}};
+    air.vertical_transmittance_frac = low;
+    scenario.atmosphere.bands.push_back(air);
+  }
+  // One column of pixels sees the sky from the horizon to beyond the zenith.
+  scenario.sensor.width_px = 8;
+  scenario.sensor.height_px = 800;
+  scenario.sensor.fov_h_rad = 2.0 * std::atan(8.0 / 800.0 * std::tan(50.0 * physics::kDegree));
+  const glm::dvec3 eye{0.0, 0.0, 4.0};
+  const physics::Pose pose{eye, physics::world_from_body_look_at(eye, eye + glm::dvec3{1, 0, 1})};
+  for (const double longwave_w_m2 : {300.0, 372.0, 400.0, 428.0, 450.0}) {
+    scenario.weather[0].longwave_down_w_m2 = longwave_w_m2;
+    renderer::OutputOptions output;
+    auto made = renderer::Renderer::create(scenario, {}, output);
+    ASSERT_TRUE(made) << made.error().text;
+    renderer::FrameRequest request;
+    request.sim_time_ns = request.thermal_time_ns = 3'600'000'000'000;
+    request.sensor_pose = pose;
+    const int slot = (*made)->submit(request);
+    const auto& view = (*made)->collect(static_cast<renderer::SlotIndex>(slot));
+    // Add up radiance times the cosine to the zenith over the rings between pixels.
+    double sent_w_m2 = 0.0;
+    double covered_frac = 0.0;
+    const auto sine_at = [&](double y) {
+      const double tan_v = std::tan(50.0 * physics::kDegree);
+      return std::sin(45.0 * physics::kDegree + std::atan((1.0 - 2.0 * y / 800.0) * tan_v));
+    };
+    for (std::uint32_t y = 0; y < 800; ++y) {
+      const double angle = 45.0 * physics::kDegree +
+                           std::atan((1.0 - 2.0 * y / 800.0) * std::tan(50.0 * physics::kDegree));
+      if (angle > physics::kPi / 2.0 || sine_at(y + 1.0) < 0.0) continue;
+      const double share = sine_at(y) * sine_at(y) - sine_at(y + 1.0) * sine_at(y + 1.0);
+      covered_frac += share;
+      for (std::size_t b = 0; b < 3; ++b) {
+        sent_w_m2 += physics::kPi * share * view.radiance_w_m2_sr[b][y * 8 + 4];
+      }
+    }
+    EXPECT_GT(covered_frac, 0.999);
+    EXPECT_NEAR(sent_w_m2, longwave_w_m2, 0.01 * longwave_w_m2);
   }
 }
 

@@ -114,7 +114,7 @@ class AirLookups {
         for (const auto& [sensor_m, row_numbers] : heights) {
           const std::size_t first = nodes_.size();
           nodes_.resize(first + AirView::kNodes);
-          views[v].at(sensor_m, 0.0, std::span(nodes_).subspan(first));
+          views[v].at(sensor_m, {}, std::span(nodes_).subspan(first));
           for (const std::size_t row : row_numbers) first_[row] = first;
         }
         ++v;

@@ -47,16 +47,25 @@ class AirView {
   [[nodiscard]] static std::vector<AirView> build(const AirColumn& column,
                                                   std::span<const Subject> subjects);
 
+  /// Air and clouds of an instant.
+  struct Weather {
+    double warmer_k = 0.0;      ///< air at sea level against that of the climate
+    double sky_warmer_k = 0.0;  ///< the same for the sky alone
+    double cloud_cover_frac = 0.0;
+    double cloud_base_m = 0.0;            ///< above sea level
+    double cloud_radiance_w_m2_sr = 0.0;  ///< with the air below them, in band
+  };
   /// Writes the table of a sensor at a height above sea level: the lines of sight
-  /// [target height][range], then the sky by elevation. The air at the ground is `warmer_k` warmer
-  /// than that of the climate; it is clamped to +-kMostWarmerK. RT-safe.
+  /// [target height][range], then the sky by elevation. Both differences of the air are clamped to
+  /// +-kMostWarmerK. Clouds cover the same share of the sky in all directions; a sensor above their
+  /// base sees none. RT-safe.
   /// @pre out.size() == kNodes
-  void at(double sensor_m, double warmer_k, std::span<Node> out) const noexcept;
+  void at(double sensor_m, const Weather& weather, std::span<Node> out) const noexcept;
   static constexpr double kMostWarmerK = 40.0;
 
-  /// Returns the cosine-weighted mean of the sky's radiance over the upper hemisphere at a height,
-  /// W m-2 sr-1. RT-safe.
-  [[nodiscard]] double sky_mean_w_m2_sr(double height_m, double warmer_k) const noexcept;
+  /// Returns the cosine-weighted mean of the clear sky's radiance over the upper hemisphere at a
+  /// height, W m-2 sr-1. RT-safe.
+  [[nodiscard]] double clear_sky_mean_w_m2_sr(double height_m, double warmer_k) const noexcept;
   /// Returns the transmittance to space for the third source at a height, by the sine of the
   /// apparent elevation. RT-safe.
   [[nodiscard]] double sun_transmittance_frac(double height_m, double sin_elevation) const noexcept;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstdint>
+#include <optional>
 
 #include "emit/physics/sun.hpp"
 #include "emit/physics/units.hpp"
@@ -39,14 +40,32 @@ struct SolarIrradiance {
 /// an airless elevation; below -1 deg it is the airless one.
 [[nodiscard]] Radians apparent_elevation(Radians airless) noexcept;
 
+/// Base of the clouds. Without a height and a temperature it is as warm as eq. 12 was fitted with:
+/// 0.941 of the air's temperature.
+struct CloudBase {
+  std::optional<double> height_m = std::nullopt;  ///< above the ground, 0..12000
+  std::optional<double> kelvin = std::nullopt;    ///< if absent, that of air that cools by 6.5 K/km
+};
+/// Returns the temperature of the clouds' base above air of `air_k` at the ground, K.
+[[nodiscard]] double cloud_base_k(const CloudBase& base, double air_k) noexcept;
+/// Returns the height of the clouds' base above the ground, m: as stated, or where air that cools
+/// by 6.5 K/km has its temperature.
+[[nodiscard]] double cloud_base_m(const CloudBase& base, double air_k) noexcept;
+
+/// Clouds whose base follows from an irradiance are at least that high above the ground, so that a
+/// camera that stands on it is below them.
+inline constexpr double kLowestInferredBaseM = 100.0;
+
 /// Returns the emissivity of the sky, at most 1, physics.md eq. 12: the Berdahl-Martin form as
-/// recalibrated by Li et al. (2017), plus the cloud term 0.784 (1 - e) n. `cloud_frac` is n and is
-/// clamped to 0..1. The dew point should lie in 230..310 K.
+/// recalibrated by Li et al. (2017), plus the cloud term 0.784 (1 - e) n, for clouds with a base of
+/// 0.941 times the air's temperature. `cloud_frac` is n and is clamped to 0..1. The dew point
+/// should lie in 230..310 K.
 [[nodiscard]] double sky_emissivity_frac(Kelvin dew_point, double cloud_frac) noexcept;
 
-/// Returns the long-wave irradiance of the whole sky on a horizontal face, e_sky sigma T_air^4, W
-/// m-2.
-[[nodiscard]] double sky_longwave_w_m2(Kelvin air, Kelvin dew_point, double cloud_frac) noexcept;
+/// Returns the long-wave irradiance of the whole sky on a horizontal face, W m-2: e_sky sigma
+/// T_air^4, where the clouds' 0.784 is the fourth power of their base's temperature by the air's.
+[[nodiscard]] double sky_longwave_w_m2(Kelvin air, Kelvin dew_point, double cloud_frac,
+                                       const CloudBase& base = {}) noexcept;
 
 /// Returns the air temperature mean + amplitude cos(2 pi (t - 15 h) / 24 h), physics.md eq. 13.
 /// `solar_hours` is t, the mean local solar time in hours.

@@ -36,6 +36,7 @@ struct ClearSky {
   double wind_m_s = 2.0;
   double cloud_frac = 0.0;
   std::optional<double> wind_from_rad;  ///< see WeatherSample
+  CloudBase cloud_base = {};            ///< of any weather, not only of these models
 };
 
 /// Inputs of physics.md eq. 1 that do not depend on the surface.

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// The reference's sky, which has formulas of its own, against the one that the renderer shows.
+#include "solve_radiance.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <span>
+#include <tuple>
+#include <vector>
+
+#include "emit/physics/air_view.hpp"
+#include "emit/physics/constants.hpp"
+#include "emit/physics/planck.hpp"
+#include "emit/physics/sky_state.hpp"
+
+namespace emit::reference {
+namespace {
+
+const std::vector<physics::CloudBase> kBases{
+    {}, {.height_m = 300.0}, {.kelvin = 265.0}, {.height_m = 2000.0, .kelvin = 280.0}};
+
+TEST(ReferenceSky, bisection_finds_the_sky_of_the_closed_form) {
+  for (const physics::CloudBase& base : kBases) {
+    for (double longwave_w_m2 = 200.0; longwave_w_m2 < 480.0; longwave_w_m2 += 9.0) {
+      SCOPED_TRACE(longwave_w_m2);
+      for (const double stated_frac : {0.0, 0.5, 1.0}) {
+        const physics::SkyState own =
+            sky_by_bisection(longwave_w_m2, 288.0, 279.0, stated_frac, base);
+        const physics::SkyState shown =
+            physics::sky_state(longwave_w_m2, 288.0, 279.0, stated_frac, base);
+        EXPECT_NEAR(own.cloud_cover_frac, shown.cloud_cover_frac, 1e-9);
+        EXPECT_NEAR(own.cloud_k, shown.cloud_k, 1e-6);
+        EXPECT_NEAR(own.cloud_base_m, shown.cloud_base_m, 0.1);
+        EXPECT_NEAR(own.warmer_k, shown.warmer_k, 1e-6);
+      }
+    }
+  }
+}
+
+TEST(ReferenceSky, agrees_with_the_tables_of_the_renderer_under_clouds) {
+  scene::ScenarioDesc scenario;
+  scenario.place.height_m = 380.0;
+  scenario.atmosphere.enabled = true;
+  const physics::AirSpec spec{physics::AirClimate::midlatitude_summer, 23.0, 1.0};
+  for (const auto& [name, lo_um, hi_um] :
+       {std::tuple{"3-5", 3.0, 5.0}, std::tuple{"8-12", 8.0, 12.0}}) {
+    scenario.bands.push_back({name, lo_um, hi_um, {}});
+    scene::BandAtmosphere air;
+    air.band = name;
+    air.model = spec;
+    scenario.atmosphere.bands.push_back(air);
+  }
+  const auto column = physics::AirColumn::build(spec);
+  ASSERT_TRUE(column) << column.error().text;
+  const double air_k = 291.0;
+  const double fade = std::exp(scenario.place.height_m / physics::BandAir::kWarmthScaleM);
+  const double warmer_k = (air_k - column->at(scenario.place.height_m).kelvin) * fade;
+  for (std::size_t b = 0; b < scenario.bands.size(); ++b) {
+    const auto& band = scenario.bands[b];
+    auto own = BandRadiance::create(scenario, b);
+    ASSERT_TRUE(own) << own.error().text;
+    const physics::BandAir terms = *physics::BandAir::find(band.name);
+    const physics::AirView::Subject subject{&terms};
+    const auto views = physics::AirView::build(*column, std::span(&subject, 1));
+    std::vector<physics::AirView::Node> table(physics::AirView::kNodes);
+    // Colder than a clear sky, half covered, overcast, and warmer than the air.
+    for (const double longwave_w_m2 : {290.0, 350.0, 385.0, 420.0}) {
+      const auto sky_now = physics::sky_state(longwave_w_m2, air_k, 280.0, 0.0, {});
+      own->set_air(air_k, {}, 0.0, sky_now);
+      const double cloud =
+          physics::band_radiance({band.lo_um, band.hi_um, {}}, physics::Kelvin(sky_now.cloud_k))
+              .radiance_w_m2_sr;
+      views[0].at(scenario.place.height_m + 20.0,
+                  {.warmer_k = warmer_k,
+                   .sky_warmer_k = warmer_k + sky_now.warmer_k * fade,
+                   .cloud_cover_frac = sky_now.cloud_cover_frac,
+                   .cloud_base_m = scenario.place.height_m + sky_now.cloud_base_m,
+                   .cloud_radiance_w_m2_sr = cloud},
+                  table);
+      for (const double elevation_deg : {1.0, 5.0, 20.0, 60.0, 90.0}) {
+        const double sine = std::sin(elevation_deg * physics::kDegree);
+        const double expected = own->sky(20.0, sine);
+        EXPECT_NEAR(physics::air_sky(table, static_cast<float>(sine)).path_radiance_w_m2_sr,
+                    expected, 0.02 * expected)
+            << band.name << ' ' << longwave_w_m2 << ' ' << elevation_deg;
+      }
+      const double mean = (1.0 - sky_now.cloud_cover_frac) *
+                              views[0].clear_sky_mean_w_m2_sr(scenario.place.height_m,
+                                                              warmer_k + sky_now.warmer_k * fade) +
+                          sky_now.cloud_cover_frac * cloud;
+      EXPECT_NEAR(mean, own->sky_mean(), 0.01 * own->sky_mean())
+          << band.name << ' ' << longwave_w_m2;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace emit::reference
