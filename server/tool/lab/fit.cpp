@@ -12,6 +12,7 @@
 #include "emit/scene/base.hpp"
 #include "tool/command_line/common_options.hpp"
 #include "tool/lab/fit_materials.hpp"
+#include "tool/lab/fit_measured.hpp"
 #include "tool/lab/lab.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/json.hpp"
@@ -34,6 +35,7 @@ struct FitOptions {
   std::optional<std::filesystem::path> out;
   std::optional<std::filesystem::path> toml;
   std::optional<std::filesystem::path> json;
+  MeasuredFitOptions measured;
 };
 
 using physics::ErrorCode;
@@ -231,7 +233,25 @@ Result<void> write_files(const FitOptions& command, FitOutput& output) {
   return write_json(*command.json, json);
 }
 
+/// Fits numbers of the ground to a logger's record.
+int run_measured(const FitOptions& command) {
+  if (command.materials.size() > 1) {
+    return fail(kExitUsage, "--measured takes one --material: the ground below the logger");
+  }
+  if (command.out) return fail(kExitUsage, "--out: --measured writes a material with --toml");
+  MeasuredFitOptions measured = command.measured;
+  if (!command.materials.empty()) measured.ground.material = command.materials.front();
+  measured.ground.library = command.library;
+  measured.toml = command.toml;
+  measured.json = command.json;
+  return run_measured_fit(measured);
+}
+
 int run(const FitOptions& command) {
+  if (command.input.scenario.empty() == command.measured.logger.empty()) {
+    return fail(kExitUsage, "name a scenario, a curve, or --measured LOGGER.csv");
+  }
+  if (!command.measured.logger.empty()) return run_measured(command);
   reference::FitOptions options;
   options.model =
       command.model == "emit2014" ? reference::FitModel::emit2014 : reference::FitModel::foster;
@@ -271,10 +291,10 @@ void add_options(CommandLine& line, FitOptions& options) {
               "Scenario: its place, date, weather and materials, over five histories of sun and "
               "shade. Or a curve, CSV with time_s, absorbed_w_m2, film_w_m2_k, air_k, "
               "temperature_k")
-      .required()
       .type_name("SCENARIO|CURVE.csv");
   add_set(line, options.input.set);
-  line.option("--material", options.materials, "Material; repeatable; default: all of the scenario")
+  line.option("--material", options.materials,
+              "Material; repeatable; default: all of the scenario, or soil with --measured")
       .repeatable()
       .type_name("NAME");
   line.option("--modes", options.modes, "foster: 2 to 4, default 4; emit2014: 1 or 2, default 2")
@@ -301,6 +321,7 @@ void add_options(CommandLine& line, FitOptions& options) {
       "Tables [[material]] with the fitted modes, to paste into a scenario or library; "
       "-: standard output");
   add_json(line, options.json);
+  add_measured_fit_options(line, options.measured);
 }
 
 }  // namespace

@@ -264,6 +264,11 @@ class PlotWriter {
       if (!x_.shows(point.x) || !y_.shows(point.y)) continue;
       path += fmt::format("{:.1f},{:.1f} ", x_.px(point.x), y_.px(point.y));
     }
+    if (series.area) {
+      if (path.empty()) return;
+      append(R"(<polygon points="{}" fill="{}" fill-opacity="0.25" stroke="none"/>)", path, ink);
+      return;
+    }
     if (series.line && !path.empty()) {
       append(R"(<polyline points="{}" fill="none" stroke="{}" stroke-width="{}"{}/>)", path, ink,
              series.emphasis ? 2.5 : 1.5, dashed ? R"( stroke-dasharray="6 3")" : "");

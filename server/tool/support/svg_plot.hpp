@@ -35,6 +35,7 @@ struct PlotSeries {
   std::vector<PlotPoint> points;
   bool line = false;      ///< joined in the order given
   bool markers = true;    ///< a dot at every point
+  bool area = false;      ///< the points go round an area that is filled; neither line nor markers
   bool emphasis = false;  ///< thick and dark, for the data that the reader should see first
   bool dashed = false;
 };

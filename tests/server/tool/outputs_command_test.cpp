@@ -61,6 +61,7 @@ const std::vector<OutputCase>& output_cases() {
     add({"log", "export", "csv", "no.mcap"}, {}, {"--out"});
     add({"log", "export", "exr", "no.mcap", "--out", "GOOD"}, {"--json"}, {"--out"});
     add({"fit", "block-on-road"}, {"--out", "--toml", "--json"});
+    add({"fit", "--measured", "no.csv"}, {"--plot", "--history"});
     add({"generate", "box", "--out", "GOOD"}, {}, {"--out"});
     add({"make-log", "airfield", "--out", "GOOD"}, {"--out"});
     add({"export", "gnss", "no.mcap", "--scenario", "box", "--format", "nmea", "--out", "GOOD"},
@@ -93,6 +94,7 @@ const std::vector<OutputCase>& output_cases() {
     add({"bench", "turn"}, {"--json"});
     add({"bench", "live"}, {"--json"});
     add({"bench", "budget"}, {"--json"});
+    add({"bench", "nature", "no.csv"}, {"--json", "--plot"});
     return out;
   }();
   return cases;

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+// `emit fit --measured` and `emit bench nature`: columns, messages, outputs.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <regex>
+#include <sstream>
+
+#include "support/emit_process.hpp"
+
+namespace emit::test {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// A day of dry ground that neither gains nor loses over a day. The numbers are made up; only a fit
+/// has to work on them.
+std::string logger_text(const std::string& header, double surface_swing_k = 12.0,
+                        const std::vector<double>& surface_k = {}) {
+  std::string text =
+      "# Level field, 48.10 N, 11.50 E, 500 m; times are UTC of 2016-06-21.\n" + header + "\n";
+  for (int i = 0; i <= 144; ++i) {
+    const double phase = 2.0 * std::numbers::pi * i / 144.0;
+    const double sun = std::max(0.0, 800.0 * std::sin(phase - 1.5));
+    const double swing_k = surface_swing_k * std::sin(phase - 1.75);
+    text +=
+        fmt::format("{},{:.1f},{:.1f},{:.1f},{:.2f},{:.1f},{:.4f}\n", 600 * i, sun, 0.2 * sun,
+                    320.0 + 15.0 * std::sin(phase - 2.2), 14.0 + 5.0 * std::sin(phase - 2.4),
+                    2.5 + std::sin(phase - 2.0),
+                    surface_k.empty() ? 289.0 + swing_k : surface_k[static_cast<std::size_t>(i)]);
+  }
+  return text;
+}
+constexpr char kHeader[] =
+    "time_s,ghi_w_m2,reflected_w_m2,longwave_down_w_m2,air_c,wind_m_s,surface_k";
+
+TEST(CliFitMeasured, writes_a_material_that_loads_and_all_outputs) {
+  const TemporaryFolder folder;
+  write_text(folder.file("day.csv"), logger_text(kHeader));
+  const ProcessResult fit =
+      run_emit({"fit", "--measured", folder.file("day.csv"), "--material", "soil", "--toml",
+                folder.file("fitted.toml"), "--json", folder.file("fit.json"), "--plot",
+                folder.file("fit.svg"), "--history", folder.file("fit.csv")});
+  ASSERT_EQ(fit.exit_code, 0) << fit.err;
+  EXPECT_THAT(fit.out, HasSubstr("inertia"));
+  EXPECT_THAT(fit.out, HasSubstr("absorptance 0.800: reflected over incident sun"));
+  EXPECT_THAT(read_text(folder.file("fit.json")), HasSubstr("\"standard_error\""));
+  EXPECT_THAT(read_text(folder.file("fit.svg")), HasSubstr("measured"));
+  EXPECT_THAT(read_text(folder.file("fit.csv")), HasSubstr("time_s,surface_k,before_k,fitted_k"));
+  EXPECT_THAT(read_text(folder.file("fitted.toml")), HasSubstr("base = \"room\""));
+  // The library that was written is one: a second fit starts from its numbers and changes little.
+  const ProcessResult again =
+      run_emit({"fit", "--measured", folder.file("day.csv"), "--material", "soil", "--library",
+                folder.file("fitted.toml"), "--json", folder.file("again.json")});
+  ASSERT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_THAT(again.out, HasSubstr("stated by the material"));
+}
+
+TEST(CliFitMeasured, names_file_line_and_column_of_what_is_wrong) {
+  const TemporaryFolder folder;
+  const std::string file = folder.file("day.csv");
+  const auto error_of = [&](const std::string& text, std::vector<std::string> more = {}) {
+    write_text(file, text);
+    more.insert(more.begin(), {"fit", "--measured", file});
+    const ProcessResult result = run_emit(more);
+    EXPECT_NE(result.exit_code, 0);
+    return result.err;
+  };
+  EXPECT_THAT(error_of("time_s,ghi_w_m2,air_c,wind_m_s,surface_k\n0,0,1,1,280\n"),
+              HasSubstr("day.csv:1: there is no column 'longwave_down_w_m2'"));
+  std::string text = logger_text(kHeader);
+  const std::size_t row = text.find("\n1200,");
+  text.replace(row, 6, "\n1200,x");
+  EXPECT_THAT(error_of(text), HasSubstr("day.csv:5:"));
+  EXPECT_THAT(error_of(logger_text(kHeader, 900.0)), HasSubstr("surface_k"));
+  EXPECT_THAT(error_of(logger_text(kHeader), {"--column", "aire_c=x"}), HasSubstr("'air_c'"));
+  EXPECT_THAT(error_of(logger_text(kHeader), {"--material", "sol"}), HasSubstr("'soil'"));
+  EXPECT_THAT(error_of(logger_text(kHeader).substr(0, 2000)), HasSubstr("h are needed"));
+}
+
+TEST(CliFitMeasured, reads_columns_of_other_names_and_units) {
+  const TemporaryFolder folder;
+  write_text(folder.file("day.csv"), logger_text(kHeader));
+  write_text(folder.file("other.csv"), logger_text("time_s,G,reflected_w_m2,Ld,air_c,u,surface_k"));
+  const ProcessResult first = run_emit({"fit", "--measured", folder.file("day.csv")});
+  const ProcessResult other =
+      run_emit({"fit", "--measured", folder.file("other.csv"), "--column", "ghi_w_m2=G", "--column",
+                "longwave_down_w_m2=Ld", "--column", "wind_m_s=u"});
+  ASSERT_EQ(first.exit_code, 0) << first.err;
+  ASSERT_EQ(other.exit_code, 0) << other.err;
+  EXPECT_EQ(first.out.substr(first.out.find('\n')), other.out.substr(other.out.find('\n')));
+}
+
+TEST(CliFitMeasured, says_aloud_what_does_not_hold) {
+  const TemporaryFolder folder;
+  write_text(folder.file("day.csv"), logger_text(kHeader, 4.0));
+  const ProcessResult cool =
+      run_emit({"fit", "--measured", folder.file("day.csv"), "--surface", "moist grass"});
+  ASSERT_EQ(cool.exit_code, 0) << cool.err;
+  EXPECT_THAT(cool.out, HasSubstr("DOES NOT HOLD: the file speaks of 'grass'"));
+  EXPECT_THAT(cool.out, HasSubstr("DOES NOT HOLD: the file speaks of 'moist'"));
+  // A surface that stays as cool as that in the sun evaporates, whatever the file says.
+  EXPECT_THAT(cool.out, HasSubstr("evaporation is likely"));
+  const ProcessResult dry =
+      run_emit({"fit", "--measured", folder.file("day.csv"), "--surface", "dry, snow-free"});
+  EXPECT_EQ(dry.out.find("speaks of"), std::string::npos) << dry.out;
+}
+
+/// Numbers behind a key of a JSON text, in order.
+std::vector<double> json_numbers(const std::string& json, const std::string& key) {
+  std::vector<double> out;
+  const std::regex form("\"" + key + "\": (-?[0-9.e+-]+)");
+  for (std::sregex_iterator at(json.begin(), json.end(), form); at != std::sregex_iterator();
+       ++at) {
+    out.push_back(std::stod((*at)[1]));
+  }
+  return out;
+}
+
+TEST(CliBenchNature, a_day_of_the_model_itself_is_met_and_its_numbers_are_found) {
+  const TemporaryFolder folder;
+  write_text(folder.file("any.csv"), logger_text(kHeader));
+  ASSERT_EQ(run_emit({"fit", "--measured", folder.file("any.csv"), "--history",
+                      folder.file("history.csv")})
+                .exit_code,
+            0);
+  std::vector<double> model_k;
+  std::istringstream history(read_text(folder.file("history.csv")));
+  std::string line;
+  std::getline(history, line);
+  while (std::getline(history, line)) {
+    model_k.push_back(std::stod(line.substr(line.find(',', line.find(',') + 1) + 1)));
+  }
+  ASSERT_EQ(model_k.size(), 145U);
+  std::filesystem::create_directory(folder.file("days"));
+  write_text(folder.file("days/a.csv"), logger_text(kHeader, 0.0, model_k));
+  // The second day is 3 K warmer throughout.
+  for (double& kelvin : model_k) kelvin += 3.0;
+  write_text(folder.file("days/b.csv"), logger_text(kHeader, 0.0, model_k));
+  const ProcessResult bench = run_emit({"bench", "nature", folder.file("days"), "--json",
+                                        folder.file("n.json"), "--plot", folder.file("n.svg")},
+                                       std::chrono::seconds(120));
+  ASSERT_EQ(bench.exit_code, 0) << bench.err;
+  const std::string json = read_text(folder.file("n.json"));
+  const std::size_t second = json.find("\"day\": \"b.csv\"");
+  ASSERT_NE(second, std::string::npos);
+  const std::string a = json.substr(0, second);
+  const std::string b = json.substr(second);
+  EXPECT_LT(json_numbers(a, "rms_k").front(), 1e-3);
+  EXPECT_NEAR(json_numbers(b, "bias_k").front(), -3.0, 1e-2);
+  EXPECT_NEAR(json_numbers(b, "rms_k").front(), 3.0, 1e-2);
+  // The fitted numbers of the first day are those of the library.
+  const std::string fitted = a.substr(a.find("\"two_fitted\""));
+  EXPECT_NEAR(json_numbers(fitted, "inertia_factor").front(), 1.0, 1e-2);
+  EXPECT_EQ(json_numbers(a, "measured_in_band_frac").front(), 1.0);
+  EXPECT_THAT(read_text(folder.file("n.svg")), HasSubstr("<polygon"));
+  EXPECT_THAT(bench.out, HasSubstr("MISSED"));
+}
+
+TEST(CliBenchNature, names_what_it_cannot_read) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(run_emit({"bench", "nature"}).exit_code, 2);
+  const ProcessResult empty = run_emit({"bench", "nature", folder.path().string()});
+  EXPECT_NE(empty.exit_code, 0);
+  EXPECT_THAT(empty.err, HasSubstr("there is no .csv file"));
+}
+
+TEST(CliFitMeasured, refuses_options_that_do_not_belong_together) {
+  const TemporaryFolder folder;
+  write_text(folder.file("day.csv"), logger_text(kHeader));
+  EXPECT_EQ(run_emit({"fit"}).exit_code, 2);
+  EXPECT_EQ(run_emit({"fit", "box", "--measured", folder.file("day.csv")}).exit_code, 2);
+  EXPECT_EQ(run_emit({"fit", "--measured", folder.file("day.csv"), "--material", "soil",
+                      "--material", "sand"})
+                .exit_code,
+            2);
+}
+
+}  // namespace
+}  // namespace emit::test
