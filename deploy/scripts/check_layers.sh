@@ -86,11 +86,12 @@ server/bench/frame_time: server/tool/command_line server/tool/support server/ben
 server/bench/stream: server/tool/command_line server/tool/support server/tool/streams server/agents server/client server/net server/output server/rt config/include protocol renderer/image renderer/physics renderer/scene
 server/tool/fms_sim: server/axes server/motion server/net server/tool/support config/include protocol renderer/physics
 server/tool/truth: server/tool/support renderer/physics renderer/reference renderer/scene
+server/tool/doctor: server/tool/command_line server/tool/support config/include renderer/include
 server/tool/nature: server/tool/command_line server/tool/support config/include renderer/physics renderer/scene
 server/tool/offline: server/tool/command_line server/tool/support server/tool/truth renderer/include renderer/physics renderer/reference renderer/scene
 server/tool/campaign: server/app server/client server/tool/command_line server/tool/offline server/tool/report server/tool/streams server/tool/support config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
 server/tool/scenes: server/tool/command_line server/tool/offline server/tool/support config/include renderer/image renderer/include renderer/physics renderer/reference renderer/scene renderer/scene/generate
-server/tool/commands: server/tool/scenes server/tool/nature server/tool/campaign server/tool/command_line server/tool/offline server/tool/engage server/tool/truth server/tool/support server/tool/streams server/tool/view server/tool/fms_sim server/gnss server/motion server/agents/render server/app server/client server/net server/rt config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
+server/tool/commands: server/tool/doctor server/tool/scenes server/tool/nature server/tool/campaign server/tool/command_line server/tool/offline server/tool/engage server/tool/truth server/tool/support server/tool/streams server/tool/view server/tool/fms_sim server/gnss server/motion server/agents/render server/app server/client server/net server/rt config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
 server/tool/lab: server/tool/command_line server/tool/support server/tool/commands server/tool/logger server/bench/accuracy server/bench/frame_time server/bench/nature server/bench/stability server/bench/stream config/include renderer/image renderer/physics renderer/reference renderer/scene renderer/verify
 server/tool: server/tool/commands server/tool/lab server/tool/support
 '

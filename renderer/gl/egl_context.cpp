@@ -34,14 +34,19 @@ struct Candidate {
   std::string name;
 };
 
+/// Returns true if EGL lists devices.
+bool lists_devices(const char* client) {
+  return has_extension(client, "EGL_EXT_platform_device") &&
+         has_extension(client, "EGL_EXT_device_enumeration");
+}
+
 /// Returns the EGL devices, hardware before software, then the surfaceless platform. With gpu_index
 /// >= 0 it returns that device alone. `tried` gets the reason when the list is empty.
 std::vector<Candidate> list_candidates(int gpu_index, std::string& tried) {
   std::vector<Candidate> candidates;
   const char* client = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
   std::vector<Candidate> software;
-  if (has_extension(client, "EGL_EXT_platform_device") &&
-      has_extension(client, "EGL_EXT_device_enumeration")) {
+  if (lists_devices(client)) {
     std::array<EGLDeviceEXT, 64> devices{};
     EGLint count = 0;
     if (eglQueryDevicesEXT(static_cast<EGLint>(devices.size()), devices.data(), &count) ==
@@ -144,6 +149,15 @@ struct EglContext::Impl {
 };
 
 EglContext::EglContext(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+int EglContext::device_count() {
+  EGLint count = 0;
+  if (!lists_devices(eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS)) ||
+      eglQueryDevicesEXT(0, nullptr, &count) != EGL_TRUE) {
+    return 0;
+  }
+  return count;
+}
+
 EglContext::~EglContext() = default;
 EglContext::EglContext(EglContext&&) noexcept = default;
 EglContext& EglContext::operator=(EglContext&&) noexcept = default;

@@ -21,6 +21,8 @@ class EglContext {
   /// Errors (gpu): no device, or no 4.5 context; the text names every platform and device that was
   /// tried.
   [[nodiscard]] static physics::Result<EglContext> create(int gpu_index, bool debug);
+  /// Returns the number of EGL devices, of hardware and software; their indices go from 0.
+  [[nodiscard]] static int device_count();
   ~EglContext();
   EglContext(EglContext&&) noexcept;
   EglContext& operator=(EglContext&&) noexcept;

@@ -110,7 +110,7 @@ const std::vector<SectionDoc>& daemon_sections() {
                   net_fdm_keys(), NetFdmConfig{}),
       section_doc("clock", false, "Source of the clock's time.", clock_keys(), ClockConfig{}),
       section_doc("realtime", false,
-                  "Real-time settings of the agents. `deploy/scripts/check_host.sh` shows what the "
+                  "Real-time settings of the agents. `emit doctor --real-time` shows what the "
                   "host would refuse.",
                   realtime_keys(), RealtimeConfig{}),
       section_doc("host", false, "Input of poses.", host_keys(), HostConfig{}),

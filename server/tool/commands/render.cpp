@@ -335,7 +335,7 @@ int run(const RenderOptions& command) {
 void add_options(CommandLine& line, RenderOptions& options) {
   add_scenario(line, options.input, "scenario");
   add_times(
-      line, options.times,
+      line, "emit render", options.times,
       "repeatable: all times are rendered after one warm-up, in ascending order. Surfaces are "
       "refined along the shadows of all of them, except those of entities. Of block-on-road "
       "99 % of the pixels lie within 0.9 K of a run of their own, RMS 0.35 K; single pixels "

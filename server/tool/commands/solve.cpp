@@ -364,7 +364,7 @@ int run(const SolveOptions& command) {
 
 void add_options(CommandLine& line, SolveOptions& options) {
   add_scenario(line, options.input, "scenario");
-  add_times(line, options.times, "repeatable: one history gives all");
+  add_times(line, "emit solve", options.times, "repeatable: one history gives all");
   line.path("--out", options.out,
             "OpenEXR file to write. {time}, {band} and {camera} in the name stand for those of the "
             "picture; without them several add _t<time>, _<band> and _<camera> before the "

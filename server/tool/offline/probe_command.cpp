@@ -363,7 +363,7 @@ void add_options(CommandLine& line, ProbeOptions& options) {
       .repeatable()
       .type_name("POINT")
       .required();
-  add_times(line, options.times, "repeatable");
+  add_times(line, "emit probe", options.times, "repeatable");
   line.output_file("--out", options.out, "CSV table, a row per time and point; -: standard output")
       .show_default();
   line.output_file("--plot", options.plot, "Histories as SVG");

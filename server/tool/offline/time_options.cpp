@@ -14,7 +14,9 @@ namespace emit::tool {
 using physics::ErrorCode;
 using physics::make_error;
 
-void add_times(CommandLine& line, TimeChoice& target, const std::string& text) {
+void add_times(CommandLine& line, const std::string& command, TimeChoice& target,
+               const std::string& text) {
+  target.command = command;
   line.option("--time-s", target.times_s, "Simulated time since the scenario's epoch, s; " + text)
       .repeatable()
       .type_name("S");
@@ -45,7 +47,9 @@ physics::Result<std::vector<double>> resolve_times(const TimeChoice& choice,
     times_s.insert(times_s.end(), listed->begin(), listed->end());
   }
   if (times_s.empty()) {
-    return make_error(ErrorCode::invalid_argument, "no time is given: --time-s S or --times LIST");
+    return make_error(ErrorCode::invalid_argument,
+                      fmt::format("no time is given: --time-s S or --times LIST; see `{} --help`",
+                                  choice.command));
   }
   std::ranges::sort(times_s);
   times_s.erase(std::unique(times_s.begin(), times_s.end()), times_s.end());

@@ -15,10 +15,12 @@ struct TimeChoice {
   std::vector<double> times_s;  ///< of --time-s
   std::string list;             ///< of --times; empty: not given
   double utc_offset_h = 0.0;    ///< clock of the list minus UTC
+  std::string command;          ///< for messages, e.g. "emit render"
 };
 
-/// Adds --time-s, --times and --utc-offset-h. `text` completes the help of --time-s.
-void add_times(CommandLine& line, TimeChoice& target, const std::string& text);
+/// Adds --time-s, --times and --utc-offset-h to `command`. `text` completes the help of --time-s.
+void add_times(CommandLine& line, const std::string& command, TimeChoice& target,
+               const std::string& text);
 
 /// Returns the instants of both options in s, ascending, each once. Errors: invalid_argument,
 /// naming the option.

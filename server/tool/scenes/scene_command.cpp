@@ -287,7 +287,7 @@ void add_check_options(CommandLine& line, CheckOptions& options) {
 
 void add_preview_options(CommandLine& line, PreviewOptions& options) {
   add_scenario(line, options.input, "scenario");
-  add_times(line, options.times,
+  add_times(line, "emit scene preview", options.times,
             "repeatable; default: 07:00, 13:00 and 22:00 by the sun of the place");
   line.output_file("--out", options.out, "PNG file to write").required();
   line.option("--band", options.bands, "Band; repeatable; default: the first two")

@@ -102,7 +102,7 @@ TEST_F(BashCompletion, offers_the_options_of_the_command_in_the_line) {
       EXPECT_NE(text.find(option), std::string::npos) << option << "\n" << text;
     }
   }
-  EXPECT_EQ(candidates({"render", "box", "--tim"}), std::set<std::string>{"--time-s"});
+  EXPECT_EQ(candidates({"render", "box", "--tim"}), (std::set<std::string>{"--time-s", "--times"}));
 }
 
 TEST_F(BashCompletion, offers_values_files_and_folders) {
@@ -190,7 +190,7 @@ TEST_F(ManPages, there_is_one_for_every_command_and_for_the_daemon) {
   std::set<std::string> expected{"emit.1", "emitd.8"};
   for (const std::string& command : commands_in_help()) expected.insert("emit-" + command + ".1");
   for (const Words& group :
-       {Words{"bench"}, Words{"log"}, Words{"log", "export"}, Words{"export"}}) {
+       {Words{"bench"}, Words{"log"}, Words{"log", "export"}, Words{"export"}, Words{"scene"}}) {
     std::string name = "emit-";
     for (const std::string& word : group) name += word + "-";
     for (const std::string& command : commands_in_help(group)) {

@@ -24,7 +24,7 @@ INSTANTIATE_TEST_SUITE_P(Commands, CliHelp,
                                          "generate", "log", "make-log", "bench", "latency",
                                          "trigger", "trace", "solve", "fit", "fms-sim", "man",
                                          "export", "weather", "materials", "probe", "campaign",
-                                         "scene"));
+                                         "scene", "doctor"));
 
 TEST(CliUsage, commands_of_emit_lab_are_those_of_emit) {
   const std::string folder = EMIT_TEST_BIN_DIR;
