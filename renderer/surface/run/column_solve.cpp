@@ -24,7 +24,7 @@ ColumnSolve::ColumnSolve(const SurfaceSamples& all, const SampleHeat& heat)
 }
 
 void ColumnSolve::begin(double dt_s) noexcept {
-  dt_s_ = dt_s;
+  dt_s_ = dt_s > 0.0 ? dt_s : 1.0;  // an interval without length changes nothing
   std::ranges::fill(stepped_again_, std::uint8_t{0});
   pass_ = Pass::none;
 }

@@ -143,6 +143,20 @@ TEST(RendererCached, HeatAtEdgesGoesOnAsAWarmUpHasIt) {
   EXPECT_LT(difference(last, fresh).p99_k, 0.1 * heat.p99_k);
 }
 
+TEST(RendererCached, HeatAtEdgesBeginsWithTheHistory) {
+  auto scenario = box_with_edges();
+  const auto pose = looking({0.5, 0.0, 3.3}, {0.5, 0.001, 2.0});
+  // Before the history and at its start no time has passed in which heat could move.
+  for (const std::int64_t now_ns : {-kHourNs, std::int64_t{0}, std::int64_t{1}, kSecondNs / 2}) {
+    scenario.thermal.lateral = true;
+    const auto with = Session(scenario).frame_k(now_ns, pose);
+    scenario.thermal.lateral = false;
+    const auto without = Session(scenario).frame_k(now_ns, pose);
+    for (const float t : with) ASSERT_FALSE(std::isnan(t)) << now_ns;
+    EXPECT_LT(difference(with, without).max_k, 0.05) << now_ns;
+  }
+}
+
 TEST(RendererCached, HeatAtEdgesDoesNotDependOnTheFrames) {
   const auto scenario = box_with_edges();
   const auto pose = looking({2.2, -2.6, 3.2}, {0.0, 0.0, 1.2});
