@@ -201,9 +201,6 @@ void FosterHeat::begin_column(const SurfaceSample& sample, SampleState& state) c
   }
 }
 
-/// Shortest time over which cells exchange heat, s.
-constexpr double kShortestS = 1e-3;
-
 double FosterHeat::losses_w_m2_k(const SampleAdvance& each, const HeatInterval& interval,
                                  const FilmDrive& film) const noexcept {
   const SurfaceSample& sample = *each.sample;
@@ -227,6 +224,7 @@ ColumnEquations FosterHeat::column_equations(const SampleAdvance& each,
   const SampleColumn& column = *each.drive.aside.column;
   const physics::ColumnCells& cells = cells_[sample.material];
   // An interval without length, as at the start of the history, leaves the cells as they are.
+  constexpr double kShortestS = 1e-3;
   const double per_s = 1.0 / std::max(interval.forcing.dt_s, kShortestS);
   const double base_k =
       sample.body >= 0 ? each.drive.body_k : surfaces_[sample.material].base_offset_k;

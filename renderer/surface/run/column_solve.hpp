@@ -24,8 +24,11 @@ namespace emit::renderer {
 /// the constructor is RT-safe.
 class ColumnSolve {
  public:
-  /// Passes that a solution usually takes, by which callers plan its time.
-  static constexpr std::size_t kUsualPasses = 60;
+  /// Most steps over one interval. The rest of an error waits for the next interval.
+  static constexpr int kMostSteps = 60;
+  /// Most passes that a solution takes, by which callers plan its time: three for each step, two to
+  /// begin and one to keep. A solution that needs fewer ends earlier.
+  static constexpr std::size_t kMostPasses = 3 * static_cast<std::size_t>(kMostSteps) + 3;
 
   ColumnSolve(const SurfaceSamples& all, const SampleHeat& heat);
 
@@ -72,8 +75,6 @@ class ColumnSolve {
   };
   /// Conductance by which a held cell keeps its temperature, W/m2/K.
   static constexpr double kHoldW = 1e7;
-  /// Most steps over one interval. The rest of an error waits for the next interval.
-  static constexpr int kMostSteps = 60;
 
   void hold(std::uint32_t column, const SampleState& state) noexcept;
   void end_pass() noexcept;

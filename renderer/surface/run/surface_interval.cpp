@@ -14,7 +14,7 @@ namespace emit::renderer {
 namespace {
 
 /// Share of the time in which samples advance, if there are columns whose heat is found afterwards,
-/// and the share at which that is usually done.
+/// and the share at which that is done at the latest.
 constexpr double kSamplesFrac = 0.5;
 constexpr double kColumnsFrac = 0.9;
 
@@ -110,7 +110,7 @@ void SurfaceInterval::compute(const SurfaceNode& from, SurfaceNode& to, double p
     return;
   }
   const std::size_t until = due((passed_frac - kSamplesFrac) / (kColumnsFrac - kSamplesFrac),
-                                ColumnSolve::kUsualPasses * columns_->columns());
+                                ColumnSolve::kMostPasses * columns_->columns());
   if (until > columns_->worked()) columns_->work(until - columns_->worked(), to, workers);
 }
 
