@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <utility>
 
 #include "emit/physics/check.hpp"
@@ -60,6 +61,10 @@ bool outside(const LightFrustum& frustum, const glm::dvec3& centre_m,
   return false;
 }
 
+/// Draws and index ranges of all windows besides those of one whole view.
+constexpr std::size_t kMoreWindowRecords = 1024;
+constexpr std::size_t kMoreWindowRanges = 16'384;
+
 /// Box moved by a vector; an empty box stays empty.
 scene::Aabb shifted(const scene::Aabb& box, const glm::dvec3& by_m) noexcept {
   return box.empty() ? box : scene::Aabb{box.min_m + by_m, box.max_m + by_m};
@@ -101,13 +106,20 @@ DrawLists::DrawLists(const SceneBuffers& scene, std::span<const std::int32_t> hi
   light_placed_ = view_placed_;
   stands_.resize(entities_);
   EMIT_CHECK(anchors_.empty() || anchors_.size() >= entities_);
-  // Allocate for the worst case, so that a frame allocates nothing.
-  records_.reserve(std::max<std::size_t>(1, submesh_instances));
+  // Allocate for the worst case, so that a frame allocates nothing. Windows of targets have a
+  // limit, because the worst case is the whole scene in each.
+  if (entities_ > 0) {
+    window_records_ = submesh_instances + kMoreWindowRecords;
+    window_ranges_ = view_ranges + kMoreWindowRanges;
+    windows_.resize(entities_);
+    near_window_.reserve(instances.size());
+  }
+  records_.reserve(std::max<std::size_t>(1, submesh_instances + window_records_));
   light_records_.reserve(std::max<std::size_t>(1, instances.size() * max_passes));
-  view_draws_.reserve(submesh_instances);
-  view_ranges_.index_count.reserve(view_ranges);
-  view_ranges_.index_offset.reserve(view_ranges);
-  view_ranges_.base_vertex.reserve(view_ranges);
+  view_draws_.reserve(submesh_instances + window_records_);
+  view_ranges_.index_count.reserve(view_ranges + window_ranges_);
+  view_ranges_.index_offset.reserve(view_ranges + window_ranges_);
+  view_ranges_.base_vertex.reserve(view_ranges + window_ranges_);
   light_commands_.reserve(instances.size() * max_passes);
 }
 
@@ -159,7 +171,8 @@ void DrawLists::add_range(std::uint32_t first_index, std::uint32_t index_count,
 }
 
 void DrawLists::add_ranges(std::uint32_t instance, const SceneBuffers::DrawRange& submesh,
-                           const ClusterView& seen, const glm::mat4& clip_from_mesh) noexcept {
+                           const ClusterView& seen, const glm::mat4& clip_from_mesh,
+                           TriangleCull* cull) noexcept {
   const std::int32_t base_vertex = scene_.base_vertex(instance);
   if (submesh.cluster_count == 0) {
     add_range(submesh.first_index, submesh.index_count, base_vertex);
@@ -172,9 +185,7 @@ void DrawLists::add_ranges(std::uint32_t instance, const SceneBuffers::DrawRange
        ++c) {
     const scene::Cluster& cluster = scene_.clusters()[c];
     if (!seen.fits(scene_.levels()[c]) || !seen.shows(cluster, submesh.double_sided)) continue;
-    if (cull_ != nullptr && cull_->take(cluster, c, clip_from_mesh, !submesh.double_sided)) {
-      continue;
-    }
+    if (cull != nullptr && cull->take(cluster, c, clip_from_mesh, !submesh.double_sided)) continue;
     if (index_count > 0 && cluster.first_index != first_index + index_count) {
       add_range(first_index, index_count, base_vertex);
       index_count = 0;
@@ -185,9 +196,7 @@ void DrawLists::add_ranges(std::uint32_t instance, const SceneBuffers::DrawRange
   if (index_count > 0) add_range(first_index, index_count, base_vertex);
   // Reserve a range for the triangles that culling keeps; cull_view() fills it in.
   const auto range = static_cast<std::uint32_t>(view_ranges_.index_count.size());
-  if (cull_ != nullptr && cull_->close(range)) {
-    add_range(0, 0, base_vertex);
-  }
+  if (cull != nullptr && cull->close(range)) add_range(0, 0, base_vertex);
 }
 
 void DrawLists::find_in_view(const ViewVolume& view) noexcept {
@@ -234,6 +243,122 @@ std::uint32_t DrawLists::indices_in_view(const SceneBuffers::DrawRange& submesh,
   return indices;
 }
 
+void DrawLists::add_draw(std::uint32_t instance, const SceneBuffers::DrawRange& submesh,
+                         const ViewVolume& view, const LevelLimits& limits,
+                         TriangleCull* cull) noexcept {
+  // Append a record and the index ranges of the visible clusters.
+  const glm::dmat4 matrix = relworld_from_mesh(view_placed_[instance]);
+  const auto first = static_cast<std::uint32_t>(view_ranges_.index_count.size());
+  const auto record = static_cast<std::uint32_t>(records_.size());
+  const std::int32_t entity = history_of_instance_[instance];
+  const EntityStand* stand = entity >= 0 ? &stands_[static_cast<std::size_t>(entity)] : nullptr;
+  records_.push_back(record_of(view.clip_from_relworld, matrix, scene_.instances()[instance].object,
+                               submesh.material, stand));
+  add_ranges(instance, submesh, ClusterView(view, matrix, limits),
+             records_.back().params.clip_from_mesh, cull);
+  const auto count = static_cast<std::uint32_t>(view_ranges_.index_count.size()) - first;
+  // Drop the record of an instance that shows nothing.
+  if (count == 0) {
+    records_.pop_back();
+    return;
+  }
+  view_draws_.push_back({record, first, count});
+}
+
+std::span<const TargetWindow> DrawLists::find_targets(const ViewVolume& view,
+                                                      const glm::uvec2& size_px, double limit_px,
+                                                      const LevelLimits& limits) noexcept {
+  // Fit a window around every entity that is in front of the camera.
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  for (std::size_t m = 0; m < windows_.size(); ++m) {
+    windows_[m] = {};
+    windows_[m].entity = static_cast<std::uint32_t>(m);
+    windows_[m].first_px = glm::dvec2(kInfinity);
+    windows_[m].end_px = glm::dvec2(-kInfinity);
+  }
+  for (const std::uint32_t i : moving_) {
+    const Placed& placed = view_placed_[i];
+    const scene::Instance& instance = scene_.instances()[i];
+    TargetWindow& window = windows_[static_cast<std::size_t>(history_of_instance_[i])];
+    window.object = instance.object;
+    if (!placed.on || window.end_px.x == kInfinity) continue;
+    if (!add_box(window, view, relworld_from_mesh(placed), scene_.mesh_bounds(instance.mesh),
+                 size_px)) {
+      window.end_px = glm::dvec2(kInfinity);  // it is too near, whatever its other meshes are
+    }
+  }
+  // Take those that are small, and list what each window shows.
+  std::size_t targets = 0;
+  for (std::size_t m = 0; m < windows_.size() && targets < EMIT_MAX_TARGETS; ++m) {
+    TargetWindow window = windows_[m];
+    const glm::dvec2 extent_px = window.size_px();
+    const double longer_px = std::max(extent_px.x, extent_px.y);
+    const bool small = longer_px <= limit_px && std::min(extent_px.x, extent_px.y) > 0.0;
+    const bool inside = window.end_px.x > 0.0 && window.end_px.y > 0.0 &&
+                        window.first_px.x < size_px.x && window.first_px.y < size_px.y;
+    if (!small || !inside) continue;
+    window.samples = glm::uvec2(window_samples(longer_px));
+    if (!cull_window(window, view, size_px, limits)) continue;
+    windows_[targets++] = window;
+  }
+  // Leave them out of the image.
+  for (const std::uint32_t i : moving_) {
+    view_placed_[i].in_window =
+        std::ranges::any_of(std::span(windows_).first(targets), [&](const TargetWindow& window) {
+          return static_cast<std::int32_t>(window.entity) == history_of_instance_[i];
+        });
+  }
+  return std::span(windows_).first(targets);
+}
+
+bool DrawLists::cull_window(TargetWindow& window, const ViewVolume& view, const glm::uvec2& size_px,
+                            LevelLimits limits) noexcept {
+  const ViewVolume through = view_through(window, view, size_px);
+  // Judge levels of detail by the samples of the window.
+  const glm::dvec2 sample_px = window.size_px() / glm::dvec2(window.samples);
+  limits.pixel_rad = 2.0 * view.tan_half_h / size_px.x * std::min(sample_px.x, sample_px.y);
+  // Find the instances that reach into the window and are not behind the target.
+  near_window_.clear();
+  const std::array<glm::dvec3, 5> planes = view_planes(through);
+  const glm::dvec3& forward = planes.back();
+  for (std::uint32_t i = 0; i < view_placed_.size(); ++i) {
+    const Placed& placed = view_placed_[i];
+    if (!placed.on) continue;
+    const glm::dvec3 centre_m =
+        0.5 * (placed.box_world.min_m + placed.box_world.max_m) - camera_world_m_;
+    const glm::dvec3 half_m = 0.5 * (placed.box_world.max_m - placed.box_world.min_m);
+    const double nearest_m = glm::dot(forward, centre_m) - glm::dot(glm::abs(forward), half_m);
+    if (nearest_m > window.farthest_m || outside(planes, centre_m, half_m)) continue;
+    near_window_.push_back(i);
+  }
+  // List single-sided submeshes first, then double-sided ones.
+  const std::size_t records = records_.size();
+  const std::size_t draws = view_draws_.size();
+  const std::size_t ranges = view_ranges_.index_count.size();
+  for (const bool sheets : {false, true}) {
+    CommandRange& range = sheets ? window.double_sided : window.single_sided;
+    range.first = static_cast<std::uint32_t>(view_draws_.size());
+    for (const std::uint32_t i : near_window_) {
+      for (const SceneBuffers::DrawRange& submesh :
+           scene_.meshes()[scene_.instances()[i].mesh].submeshes) {
+        if (submesh.double_sided != sheets || submesh.index_count == 0) continue;
+        if (records_.size() + 1 > window_records_ ||
+            view_ranges_.index_count.size() + submesh.cluster_count + 1 > window_ranges_) {
+          records_.resize(records);
+          view_draws_.resize(draws);
+          view_ranges_.index_count.resize(ranges);
+          view_ranges_.index_offset.resize(ranges);
+          view_ranges_.base_vertex.resize(ranges);
+          return false;
+        }
+        add_draw(i, submesh, through, limits, nullptr);
+      }
+    }
+    range.count = static_cast<std::uint32_t>(view_draws_.size()) - range.first;
+  }
+  return true;
+}
+
 void DrawLists::cull_view(const ViewVolume& view, const LevelLimits& limits,
                           const glm::uvec2& size_px, CommandRange& single_sided,
                           CommandRange& double_sided) noexcept {
@@ -248,25 +373,8 @@ void DrawLists::cull_view(const ViewVolume& view, const LevelLimits& limits,
         if (submesh.double_sided != sheets || submesh.index_count == 0) continue;
         for (std::uint32_t i = mesh.first_instance; i < mesh.first_instance + mesh.instance_count;
              ++i) {
-          if (!view_placed_[i].in_view) continue;
-          // Append a record and the index ranges of the visible clusters.
-          const glm::dmat4 matrix = relworld_from_mesh(view_placed_[i]);
-          const auto first = static_cast<std::uint32_t>(view_ranges_.index_count.size());
-          const auto record = static_cast<std::uint32_t>(records_.size());
-          const std::int32_t entity = history_of_instance_[i];
-          const EntityStand* stand =
-              entity >= 0 ? &stands_[static_cast<std::size_t>(entity)] : nullptr;
-          records_.push_back(record_of(view.clip_from_relworld, matrix,
-                                       scene_.instances()[i].object, submesh.material, stand));
-          add_ranges(i, submesh, ClusterView(view, matrix, limits),
-                     records_.back().params.clip_from_mesh);
-          const auto count = static_cast<std::uint32_t>(view_ranges_.index_count.size()) - first;
-          // Drop the record of an instance that shows nothing.
-          if (count == 0) {
-            records_.pop_back();
-            continue;
-          }
-          view_draws_.push_back({record, first, count});
+          if (!view_placed_[i].in_view || view_placed_[i].in_window) continue;
+          add_draw(i, submesh, view, limits, cull_);
         }
       }
     }

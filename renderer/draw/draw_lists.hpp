@@ -7,6 +7,7 @@
 #include "draw/cluster_view.hpp"
 #include "draw/light_fit.hpp"
 #include "draw/scene_buffers.hpp"
+#include "draw/target_window.hpp"
 #include "history/entity_stand.hpp"
 #include "history/pose_history.hpp"
 
@@ -33,12 +34,6 @@ struct LightCommand {
   std::uint32_t first_record = 0;
   std::uint32_t count = 0;
 };
-/// Part of a list of draws.
-struct CommandRange {
-  std::uint32_t first = 0;
-  std::uint32_t count = 0;
-};
-
 /// Draws of one frame. For each pass it holds the draws that culling by boxes and clusters leaves.
 /// Owner: DrawnScene. Thread: the one of the renderer. Real time: the constructor allocates the
 /// capacity for the worst case; all other functions are RT-safe.
@@ -57,6 +52,13 @@ class DrawLists {
   /// @pre `entities` has an entry for every entity of the constructor.
   void begin(const glm::dvec3& camera_world_m, std::int64_t sim_time_ns,
              std::span<const PoseHistory> entities) noexcept;
+  /// Finds the entities whose image is at most `limit_px` wide and high in an output image of
+  /// `size_px`, and lists the draws of a window for each, at the levels of detail of full quality
+  /// in its samples. cull_view() then leaves these entities out. Of more than EMIT_MAX_TARGETS, or
+  /// where the memory of the lists is used up, the rest stays in the image. The result is valid
+  /// until the next begin().
+  std::span<const TargetWindow> find_targets(const ViewVolume& view, const glm::uvec2& size_px,
+                                             double limit_px, const LevelLimits& limits) noexcept;
   /// Lists the draws of the camera into an image of `size_px`, at the levels of detail that keep to
   /// `limits`. Single-sided and double-sided draws are separate parts of view_draws().
   void cull_view(const ViewVolume& view, const LevelLimits& limits, const glm::uvec2& size_px,
@@ -106,6 +108,7 @@ class DrawLists {
     scene::Aabb box_world;
     bool on = true;  ///< false: it is not in the scene, or it has no vertices
     bool in_view = false;
+    bool in_window = false;  ///< it belongs to a small target
   };
   /// Instance at a placement.
   [[nodiscard]] Placed place(std::uint32_t instance, const glm::dmat4& world_from_mesh,
@@ -113,12 +116,20 @@ class DrawLists {
   [[nodiscard]] glm::dmat4 relworld_from_mesh(const Placed& placed) const noexcept;
   /// Sets Placed::in_view of all instances.
   void find_in_view(const ViewVolume& view) noexcept;
+  /// Lists the draws of a window. Returns false when they do not fit into the lists.
+  [[nodiscard]] bool cull_window(TargetWindow& window, const ViewVolume& view,
+                                 const glm::uvec2& size_px, LevelLimits limits) noexcept;
+  /// Appends the draw of an instance's submesh that `view` shows, with culling of triangles or
+  /// without.
+  void add_draw(std::uint32_t instance, const SceneBuffers::DrawRange& submesh,
+                const ViewVolume& view, const LevelLimits& limits, TriangleCull* cull) noexcept;
   /// Number of indices of a submesh that `seen` shows.
   [[nodiscard]] std::uint32_t indices_in_view(const SceneBuffers::DrawRange& submesh,
                                               const ClusterView& seen) const noexcept;
   /// Appends the index ranges of an instance's submesh that `seen` shows.
   void add_ranges(std::uint32_t instance, const SceneBuffers::DrawRange& submesh,
-                  const ClusterView& seen, const glm::mat4& clip_from_mesh) noexcept;
+                  const ClusterView& seen, const glm::mat4& clip_from_mesh,
+                  TriangleCull* cull) noexcept;
   /// Removes empty ranges, because Mesa also leaves out the ranges behind an empty one.
   void drop_empty_ranges() noexcept;
   void add_range(std::uint32_t first_index, std::uint32_t index_count,
@@ -136,6 +147,10 @@ class DrawLists {
   std::vector<Placed> light_placed_;   ///< one per instance, for the shadow passes that follow
   std::vector<EntityAnchor> anchors_;  ///< by entity, or empty
   std::vector<EntityStand> stands_;    ///< by entity, at the instant of the frame
+  std::vector<TargetWindow> windows_;  ///< by entity; find_targets() moves the targets to the front
+  std::vector<std::uint32_t> near_window_;  ///< instances that a window may show
+  std::size_t window_ranges_ = 0;           ///< entries of view_ranges_ that windows may use
+  std::size_t window_records_ = 0;          ///< entries of records_ that windows may use
   scene::Aabb static_bounds_world_;
   std::vector<DrawRecord> records_;
   std::vector<LightRecord> light_records_;

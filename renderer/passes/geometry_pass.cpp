@@ -104,17 +104,14 @@ physics::Result<GeometryPass> GeometryPass::create(const gl::EglContext& context
   return pass;
 }
 
-void GeometryPass::draw(const SceneVertexArrays& vertices, const DrawLists& lists,
-                        const gl::Buffer& records, CommandRange single_sided,
-                        CommandRange double_sided, const glm::uvec2& size_px,
-                        const glm::uvec4& window_px) const noexcept {
+void GeometryPass::clear(const View& view) const noexcept {
   // Restrict drawing to the window. Pixels that are not drawn need not be cleared.
-  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.id());
-  glViewport(0, 0, static_cast<GLsizei>(size_px.x), static_cast<GLsizei>(size_px.y));
-  const glm::uvec2 part_px = window_size_px(window_px);
-  glScissor(static_cast<GLint>(window_px.x), static_cast<GLint>(window_px.y),
+  const glm::uvec2 image_px = window_size_px(view.image_px);
+  glViewport(static_cast<GLint>(view.image_px.x), static_cast<GLint>(view.image_px.y),
+             static_cast<GLsizei>(image_px.x), static_cast<GLsizei>(image_px.y));
+  const glm::uvec2 part_px = window_size_px(view.window_px);
+  glScissor(static_cast<GLint>(view.window_px.x), static_cast<GLint>(view.window_px.y),
             static_cast<GLsizei>(part_px.x), static_cast<GLsizei>(part_px.y));
-  glEnable(GL_SCISSOR_TEST);
   // Clear to sky. Depth is reversed: 0 is infinitely far away.
   const GLfloat far_away = 0.0F;
   if (!sampled_) {
@@ -126,6 +123,12 @@ void GeometryPass::draw(const SceneVertexArrays& vertices, const DrawLists& list
     glClearNamedFramebufferuiv(framebuffer_.id(), GL_COLOR, 2, none);
   }
   glClearNamedFramebufferfv(framebuffer_.id(), GL_DEPTH, 0, &far_away);
+}
+
+void GeometryPass::draw(const SceneVertexArrays& vertices, const DrawLists& lists,
+                        const gl::Buffer& records, std::span<const View> views) const noexcept {
+  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.id());
+  glEnable(GL_SCISSOR_TEST);
   // Front faces turn clockwise, because row 0 of the image is at the bottom of GL's window and the
   // view is mirrored.
   glEnable(GL_DEPTH_TEST);
@@ -134,13 +137,16 @@ void GeometryPass::draw(const SceneVertexArrays& vertices, const DrawLists& list
   glCullFace(GL_BACK);
   program_.use();
   vertices.bind_view();
-  // Draw single-sided submeshes with culling, then double-sided ones without.
-  glEnable(GL_CULL_FACE);
   threads_.leave_core_to_caller();
   const auto draw_all = software_ ? issue_in_batches : issue_at_once;
-  draw_all(lists.view_draws(single_sided), lists.view_ranges(), records);
-  glDisable(GL_CULL_FACE);
-  draw_all(lists.view_draws(double_sided), lists.view_ranges(), records);
+  for (const View& view : views) {
+    clear(view);
+    // Draw single-sided submeshes with culling, then double-sided ones without.
+    glEnable(GL_CULL_FACE);
+    draw_all(lists.view_draws(view.single_sided), lists.view_ranges(), records);
+    glDisable(GL_CULL_FACE);
+    draw_all(lists.view_draws(view.double_sided), lists.view_ranges(), records);
+  }
   if (software_) glFlush();
   threads_.spread();
   glDisable(GL_SCISSOR_TEST);

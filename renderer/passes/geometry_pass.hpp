@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <glm/ext/vector_uint2.hpp>
 #include <glm/ext/vector_uint4.hpp>
+#include <span>
 
 #include "draw/draw_lists.hpp"
 #include "emit/physics/error.hpp"
@@ -34,16 +35,24 @@ class GeometryPass {
                                                             std::uint32_t width_px,
                                                             std::uint32_t height_px,
                                                             Content content, Shade shade);
-  /// Draws two parts of the camera's draws in `lists`. `records` holds the records of `lists` on
-  /// the device. The image has `size_px` pixels, and only its window is changed.
+  /// One view and its place in the geometry buffer.
+  struct View {
+    CommandRange single_sided;  ///< parts of the camera's draws
+    CommandRange double_sided;
+    glm::uvec4 image_px{0};   ///< pixels of the buffer that the view covers
+    glm::uvec4 window_px{0};  ///< pixels that are drawn; the others stay as they are
+  };
+  /// Draws views of `lists`. `records` holds the records of `lists` on the device.
   void draw(const SceneVertexArrays& vertices, const DrawLists& lists, const gl::Buffer& records,
-            CommandRange single_sided, CommandRange double_sided, const glm::uvec2& size_px,
-            const glm::uvec4& window_px) const noexcept;
+            std::span<const View> views) const noexcept;
   /// Binds the geometry buffer to its texture units, and the texture of samples to
   /// EMIT_IMG_SURFACE.
   void bind_textures() const noexcept;
 
  private:
+  /// Makes the window of a view empty.
+  void clear(const View& view) const noexcept;
+
   gl::Program program_;
   gl::Texture depth_m_;
   gl::Texture normal_;

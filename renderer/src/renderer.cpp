@@ -27,6 +27,7 @@
 #include "passes/geometry_pass.hpp"
 #include "passes/radiance_pass.hpp"
 #include "passes/readback_ring.hpp"
+#include "passes/target_pass.hpp"
 #include "stages/band_model.hpp"
 #include "stages/cached_stage.hpp"
 #include "stages/frame_setup.hpp"
@@ -48,8 +49,8 @@ static_assert(EMIT_MAX_ATMOSPHERE_TERMS == limits::kMaxAtmosphereTerms);
 
 /// Alignment of storage blocks. GL guarantees that no driver asks for more.
 constexpr std::size_t kBlockAlignment = 256;
-/// Largest number of planes: radiance of all bands, temperature, depth, object, sun, sky.
-constexpr std::size_t kMaxPlanes = EMIT_MAX_BANDS + 5;
+/// Largest number of planes: radiance of all bands, temperature, depth, object, sun, sky, coverage.
+constexpr std::size_t kMaxPlanes = EMIT_MAX_BANDS + 6;
 
 /// Checks the limits of the renderer. Errors: config, naming the value and the limit.
 Result<void> check_limits(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
@@ -81,6 +82,11 @@ Result<void> check_limits(const scene::ScenarioDesc& scenario, const OutputOptio
     return fail(fmt::format("sensor.fov_h_min_deg is {}, wider than sensor.fov_h_deg ({})",
                             scenario.sensor.fov_h_min_rad / physics::kDegree, fov_h_deg));
   }
+  if (!(scenario.sensor.small_target_px >= 0.0 &&
+        scenario.sensor.small_target_px <= scene::kMaxSmallTargetPx)) {
+    return fail(fmt::format("sensor.small_target_px is {}: 0 to {} are possible",
+                            scenario.sensor.small_target_px, scene::kMaxSmallTargetPx));
+  }
   const auto check = [&fail](std::string_view what, std::uint32_t value,
                              const limits::Count& count) -> Result<void> {
     if (count.contains(value)) return {};
@@ -107,6 +113,7 @@ struct FramePasses {
   GeometryPass geometry;
   RadiancePass radiance;
   std::optional<EnlargePass> enlarge;  ///< empty when no frame may shed work
+  std::optional<TargetPass> targets;   ///< empty when no target can be small
 };
 
 /// Renderer on an OpenGL device.
@@ -241,10 +248,15 @@ bool has_entities(const scene::ScenarioDesc& scenario) {
                              [](const scene::ObjectDesc& object) { return object.entity_id != 0; });
 }
 
-/// Number of planes of the output image.
-std::size_t plane_count(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
+/// Number of planes that show surfaces: all but the coverage, which is the last.
+std::size_t surface_planes(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
   return scenario.bands.size() + (output.temperature ? 1U : 0U) + (output.depth ? 1U : 0U) +
          (output.object ? 1U : 0U) + (output.sun ? 1U : 0U) + (output.sky ? 1U : 0U);
+}
+
+/// Number of planes of the output image.
+std::size_t plane_count(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
+  return surface_planes(scenario, output) + (output.coverage ? 1U : 0U);
 }
 
 /// Size of all planes, rounded up to the alignment of a storage block.
@@ -323,6 +335,7 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
     if (output_.object) view.object_id = next_plane();
     if (output_.sun) view.sun_cosine = next_plane();
     if (output_.sky) view.sky_frac = next_plane();
+    if (output_.coverage) view.coverage_frac = next_plane();
   }
   glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
 }
@@ -424,8 +437,14 @@ CameraSetup GlRenderer::place_camera(const FrameRequest& request,
 }
 
 void GlRenderer::prepare(const FrameRequest& request, const QualityLevel& level) noexcept {
-  // Cull the draws of the camera.
+  // Give small targets their windows, whatever the quality level, then cull the draws of the
+  // camera.
   CameraSetup camera = place_camera(request, level);
+  std::span<const TargetWindow> targets;
+  if (passes_.targets) {
+    targets = stage_->drawn().lists.find_targets(
+        camera.view, output_px(), scenario_.sensor.small_target_px, kQualityLadder[0].limits);
+  }
   LevelLimits limits = level.limits;
   limits.pixel_rad = camera.pixel_rad;
   stage_->drawn().lists.cull_view(camera.view, limits, frame_params_.rendered_px,
@@ -439,6 +458,7 @@ void GlRenderer::prepare(const FrameRequest& request, const QualityLevel& level)
   const double sensor_m = scenario_.place.height_m + request.sensor_pose.position_world_m.z;
   frame_params_.sensor_height_m = static_cast<float>(sensor_m);
   bands_.update(stage_->forcing_now(), sun, sensor_m);
+  if (passes_.targets) passes_.targets->prepare(targets, camera.view, frame_params_);
   upload_frame();
 }
 
@@ -446,6 +466,7 @@ void GlRenderer::upload_frame() noexcept {
   frame_buffer_.upload(std::span<const gpu::FrameParams>(&frame_params_, 1));
   band_buffer_.upload(bands_.params());
   if (bands_.air_model() != 0) air_buffer_.upload(bands_.air_nodes());
+  if (passes_.targets) passes_.targets->upload();
   stage_->upload();
 }
 
@@ -559,7 +580,12 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
   const std::uint32_t zero = 0;
   glClearNamedBufferSubData(output_buffer_.id(), GL_R32UI, static_cast<GLintptr>(stats_offset_),
                             sizeof(gpu::FrameStatsGpu), GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
-
+  if (output_.coverage) {
+    const std::size_t plane_bytes = frame_params_.output_plane_px * sizeof(float);
+    glClearNamedBufferSubData(
+        output_buffer_.id(), GL_R32UI, static_cast<GLintptr>((planes_ - 1) * plane_bytes),
+        static_cast<GLsizeiptr>(plane_bytes), GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
+  }
   draw_frame(level, stages);
   read_back(static_cast<std::uint32_t>(slot));
   clock_.mark(stages.readback_ms);
@@ -571,9 +597,12 @@ void GlRenderer::draw_frame(const QualityLevel& level, StageTimes& stages) noexc
   const DrawnScene& drawn = stage_->drawn();
   const glm::uvec2 size_px(frame_params_.rendered_px);
   const glm::uvec4& window_px = frame_params_.rendered_window_px;
-  passes_.geometry.draw(drawn.vertices, drawn.lists, drawn.record_buffer, view_single_sided_,
-                        view_double_sided_, size_px,
-                        stage_->looks_around() ? window_of({}, size_px) : window_px);
+  const GeometryPass::View view{view_single_sided_, view_double_sided_, window_of({}, size_px),
+                                stage_->looks_around() ? window_of({}, size_px) : window_px};
+  passes_.geometry.draw(drawn.vertices, drawn.lists, drawn.record_buffer, {&view, 1});
+  if (passes_.targets) {
+    passes_.targets->draw_geometry(drawn.vertices, drawn.lists, drawn.record_buffer);
+  }
   clock_.mark(stages.geometry_ms);
   // Compute the temperatures.
   stage_->draw(window_size_px(window_px), stages, clock_);
@@ -585,6 +614,10 @@ void GlRenderer::draw_frame(const QualityLevel& level, StageTimes& stages) noexc
     passes_.enlarge->dispatch(window_size_px(frame_params_.output_window_px));
   } else {
     passes_.radiance.dispatch(window_size_px(window_px));
+  }
+  // Put small targets into the image last, because they have its pixels at every quality level.
+  if (passes_.targets) {
+    passes_.targets->resolve(passes_.radiance, frame_buffer_, output_buffer_, stats_offset_);
   }
   clock_.mark(stages.radiance_ms);
 }
@@ -648,14 +681,22 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
   auto radiance_pass =
       RadiancePass::create(scenario.thermal, radiance_content(*bands, output), context->software());
   if (!radiance_pass) return tl::unexpected(std::move(radiance_pass.error()));
-  FramePasses passes{std::move(*geometry_pass), std::move(*radiance_pass), {}};
+  FramePasses passes{std::move(*geometry_pass), std::move(*radiance_pass), {}, {}};
   if (cached && output.ladder != Ladder::none) {
     auto enlarge_pass =
         EnlargePass::create(static_cast<std::uint32_t>(scenario.bands.size()),
-                            static_cast<std::uint32_t>(plane_count(scenario, output)),
+                            static_cast<std::uint32_t>(surface_planes(scenario, output)),
                             std::size_t{width_px} * height_px);
     if (!enlarge_pass) return tl::unexpected(std::move(enlarge_pass.error()));
     passes.enlarge = std::move(*enlarge_pass);
+  }
+  if (cached && has_entities(scenario) && scenario.sensor.small_target_px > 0.0) {
+    auto target_pass =
+        TargetPass::create(*context, static_cast<std::uint32_t>(scenario.bands.size()),
+                           static_cast<std::uint32_t>(surface_planes(scenario, output)),
+                           output.coverage, GeometryPass::Shade::of_entities);
+    if (!target_pass) return tl::unexpected(std::move(target_pass.error()));
+    passes.targets = std::move(*target_pass);
   }
 
   // Create the renderer, then the thermal method, which reads its history.

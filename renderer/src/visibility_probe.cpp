@@ -134,8 +134,9 @@ Result<VisibilityProbe::Answer> GlProbe::at_middle(scene::SceneGeometry geometry
   shade_.bind_textures();
 
   // Run the visibility passes.
-  geometry_.draw(vertices, lists, records, single_sided, double_sided, size_px,
-                 frame.rendered_window_px);
+  const GeometryPass::View view{single_sided, double_sided, window_of({}, size_px),
+                                frame.rendered_window_px};
+  geometry_.draw(vertices, lists, records, {&view, 1});
   occlusion_.dispatch(size_px);
   for (std::uint32_t c = 0; c < frusta.count; ++c) {
     shadow_.draw(vertices, c, lists.light_commands(shadow_commands[c]));

@@ -331,6 +331,10 @@ const KeyTable<SensorDraft>& sensor_keys() {
                             kDegree),
         number<SensorDraft>("near_m", "m", between(1e-4, 1e4), EMIT_FIELD(desc.near_m),
                             "Distance of the near plane; nothing closer is drawn."),
+        number<SensorDraft>("small_target_px", "px", between(0, scene::kMaxSmallTargetPx),
+                            EMIT_FIELD(desc.small_target_px),
+                            "Entities whose image is at most this wide and high are averaged over "
+                            "the pixels they cover (physics.md section 12). 0: none."),
     };
     append_pose_keys<SensorDraft>(table, EMIT_FIELD(pose), "a sensor that does not move");
     append_trajectory_keys(table);

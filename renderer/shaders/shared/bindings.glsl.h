@@ -9,10 +9,12 @@
 #define EMIT_BIND_TAPS 3
 #define EMIT_BIND_DRAW 4
 #define EMIT_BIND_SHADE 5
+#define EMIT_BIND_TARGETS 6
 
 // Shader storage blocks. Shaders write them.
 #define EMIT_BIND_OUTPUT 0
 #define EMIT_BIND_STATS 1
+#define EMIT_BIND_TARGET_STATS 2
 
 // Texture units. A table that every pixel reads at its own index is a buffer texture, because software
 // rasterisers fetch from it much faster than from a storage block.
@@ -38,6 +40,8 @@
 #define EMIT_TEX_SHADE_TILES 19
 #define EMIT_TEX_SHADE_LIST 20
 #define EMIT_TEX_AIR 21
+#define EMIT_TEX_TARGET_PLANES 22
+#define EMIT_TEX_TARGET_ROWS 23
 
 // Image units.
 #define EMIT_IMG_OCCLUSION 0
@@ -60,6 +64,12 @@
 #define EMIT_MAX_ATMOSPHERE_TERMS 4
 #define EMIT_MAX_TAPS 256
 #define EMIT_MAX_MATERIALS 4096  // passes/surface_texel.glsl keeps 12 bits
+
+// Small targets of a frame, samples along the longer side of the tile of each, and columns of pixels that a window may
+// touch.
+#define EMIT_MAX_TARGETS 32
+#define EMIT_TARGET_SIDE 128u
+#define EMIT_TARGET_COLUMNS 36u
 
 // Boresight distance that the geometry buffer holds for a pixel without a surface.
 #define EMIT_SKY_DEPTH_M 1e30f

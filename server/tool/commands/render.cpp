@@ -34,7 +34,7 @@ struct RenderOptions {
   std::optional<std::filesystem::path> film;
   double film_rate_hz = 10.0;
   std::optional<std::filesystem::path> json;
-  std::vector<std::string> channels;  ///< empty: all of temperature, depth, object
+  std::vector<std::string> channels;  ///< empty: temperature, depth, object
   std::vector<std::string> bands;     ///< empty: the scenario's first
   std::string quality = "full";
   int gpu_index = -1;
@@ -135,6 +135,7 @@ renderer::OutputOptions output_options(const RenderOptions& command) {
       ((command.png || command.film) && png_quantity(command.png_of) == PngQuantity::temperature);
   output.depth = wants(command, "depth");
   output.object = wants(command, "object");
+  output.coverage = std::ranges::find(command.channels, "coverage") != command.channels.end();
   output.slots = 2;
   return output;
 }
@@ -199,6 +200,7 @@ physics::Result<void> Rendering::write_files(double time_s, std::size_t band,
   planes.temperature_k = view.temperature_k;
   planes.depth_m = view.depth_m;
   planes.object_id = view.object_id;
+  planes.coverage_frac = view.coverage_frac;
   planes.metadata = {view.sim_time_ns, view.frame_number,  view.sensor_pose,
                      shown.name,       shown.lo_um,        shown.hi_um,
                      "W m-2 sr-1",     response_of(shown), view.fov_h_rad};
@@ -354,9 +356,10 @@ void add_options(CommandLine& line, RenderOptions& options) {
       .show_default();
   add_png_of(line, options.png_of, true);
   line.option("--channel", options.channels,
-              "Channel beside radiance: temperature, depth, object; repeatable; default all")
+              "Channel beside radiance: temperature, depth, object, coverage (share of small "
+              "targets); repeatable; default the first three")
       .repeatable()
-      .one_of({"temperature", "depth", "object"});
+      .one_of({"temperature", "depth", "object", "coverage"});
   line.option("--band", options.bands,
               "Band of the radiance channel; repeatable: a file for each; default: the first")
       .repeatable()

@@ -134,6 +134,7 @@ physics::Result<void> write_frame_exr(const std::filesystem::path& file, const F
   add(image::kTemperatureChannel, frame.temperature_k);
   add(image::kDepthChannel, frame.depth_m);
   add(image::kObjectChannel, frame.object_id);
+  add(image::kCoverageChannel, frame.coverage_frac);
   add(image::kValidChannel, frame.valid);
   if (!frame.valid.empty()) {
     exr.attributes["missingPx"] =

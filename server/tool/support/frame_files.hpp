@@ -58,6 +58,7 @@ struct FramePlanes {
   std::span<const float> drive;  ///< command of a projector's emitters, in place of radiance
   std::span<const float> depth_m;
   std::span<const float> object_id;
+  std::span<const float> coverage_frac;
   /// Mask of the pixels: 1 where a pixel arrived, else 0. If it is not empty, the frame is marked
   /// as partial.
   std::span<const float> valid;

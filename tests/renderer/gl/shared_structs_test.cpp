@@ -8,6 +8,7 @@
 #include "gl/program.hpp"
 #include "shared/frame_params.glsl.h"
 #include "shared/shade_params.glsl.h"
+#include "shared/target_params.glsl.h"
 
 namespace emit::renderer {
 namespace {
@@ -40,6 +41,18 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   auto shade = gl::Program::compute("passes/shade.comp", rows);
   ASSERT_TRUE(shade) << shade.error().text;
 
+  const gl::Define planes[] = {{"EMIT_BANDS", "1u"}, {"EMIT_PLANES", "2u"}, {"EMIT_COVERAGE", "0"}};
+  auto targets = gl::Program::compute("passes/target_pixels.comp", planes);
+  ASSERT_TRUE(targets) << targets.error().text;
+  auto target_rows = gl::Program::compute("passes/target_rows.comp", planes);
+  ASSERT_TRUE(target_rows) << target_rows.error().text;
+
+  EXPECT_OFFSET(*targets, "targets", gpu::TargetsParams, targets[1].place_px);
+  EXPECT_OFFSET(*targets, "targets", gpu::TargetsParams, targets[1].origin);
+  EXPECT_OFFSET(*targets, "targets", gpu::TargetsParams, targets[1].per_px);
+  EXPECT_OFFSET(*target_rows, "targets", gpu::TargetsParams, targets[1].object);
+  EXPECT_OFFSET(*targets, "targets", gpu::TargetsParams, count);
+  EXPECT_OFFSET(*targets, "targets", gpu::TargetsParams, samples_width);
   EXPECT_OFFSET(*shade, "shade", gpu::ShadeParams, slope);
   EXPECT_OFFSET(*shade, "shade", gpu::ShadeParams, taps[0]);
   EXPECT_OFFSET(*geometry, "draw", gpu::DrawParams, clip_from_mesh);

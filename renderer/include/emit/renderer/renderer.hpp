@@ -54,6 +54,9 @@ struct OutputOptions {
   bool object = false;       ///< 1 + index of the scenario's object, as float; 0 for sky
   bool sun = false;  ///< visible share of the sun times the cosine of its incidence; NaN for sky
   bool sky = false;  ///< cosine-weighted share of the hemisphere that shows sky; NaN for sky
+  /// Share of the pixel that small targets cover (scene::SensorDesc::small_target_px), 0..1. Where
+  /// it is not 0 the other planes show the nearest of these targets.
+  bool coverage = false;
   Ladder ladder = Ladder::none;
   std::uint32_t slots = 3;    ///< read-back slots, 2..16: frames in flight plus frames being sent
   bool stage_timing = false;  ///< fills FrameView::stages_ms; the renderer waits after each stage
@@ -140,6 +143,7 @@ struct FrameView {
   std::span<const float> object_id;                      ///< empty unless asked for
   std::span<const float> sun_cosine;                     ///< empty unless asked for
   std::span<const float> sky_frac;                       ///< empty unless asked for
+  std::span<const float> coverage_frac;                  ///< empty unless asked for
   FrameStats stats;
   std::uint8_t quality_level = 0;  ///< quality level that was rendered
   /// Expected difference from full quality: RMS of the apparent temperature over the image, K, in

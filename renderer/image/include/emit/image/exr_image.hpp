@@ -78,6 +78,8 @@ inline constexpr char kTemperatureChannel[] = "temperature";  ///< K; NaN in the
 inline constexpr char kDriveChannel[] = "drive";              ///< command of a projector's emitter
 inline constexpr char kDepthChannel[] = "depth";    ///< m along the boresight; +Inf in the sky
 inline constexpr char kObjectChannel[] = "object";  ///< object id; 0 in the sky
+/// Share of the pixel that small targets cover, 0..1; optional.
+inline constexpr char kCoverageChannel[] = "coverage";
 inline constexpr char kValidChannel[] =
     "valid";  ///< 0 if the pixel never arrived, else 1; optional
 

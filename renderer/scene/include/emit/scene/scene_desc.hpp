@@ -225,6 +225,9 @@ struct ContactDesc {
   double resistance_m2k_w = 0.0;       ///< > 0
 };
 
+/// Largest possible SensorDesc::small_target_px.
+inline constexpr double kMaxSmallTargetPx = 32.0;
+
 /// One camera. Its pixels are square; the vertical field of view follows from the format.
 struct SensorDesc {
   std::string name;
@@ -234,6 +237,9 @@ struct SensorDesc {
   /// Narrowest field of view that frames may ask for; 0: that of `fov_h_rad`.
   double fov_h_min_rad = 0.0;
   double near_m = 0.1;
+  /// Largest image of an entity, in pixels across, that is averaged over the pixels it covers. 0:
+  /// none. Larger ones have one sample per pixel.
+  double small_target_px = kMaxSmallTargetPx;
   Trajectory trajectory;  ///< used by offline rendering and by demos; host frames override it
 
   [[nodiscard]] double narrowest_fov_rad() const noexcept {
