@@ -83,11 +83,10 @@ physics::Forcing Environment::forcing_at(std::int64_t sim_time_ns,
   if (after == live_.begin() && table_.empty()) {
     return physics::forcing_from_clear_sky(clear_sky_, place_, sun, epoch_utc_ns_ + sim_time_ns);
   }
-  physics::Forcing forcing = after != live_.begin()
-                                 ? physics::forcing_from_rows({&*(after - 1), 1}, sim_time_ns)
-                                 : physics::forcing_from_rows(table_, sim_time_ns);
-  forcing.height_m = place_.height.value();
-  return forcing;
+  return physics::at_place(after != live_.begin()
+                               ? physics::forcing_from_rows({&*(after - 1), 1}, sim_time_ns)
+                               : physics::forcing_from_rows(table_, sim_time_ns),
+                           place_, sun);
 }
 
 }  // namespace emit::renderer

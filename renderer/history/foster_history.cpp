@@ -93,7 +93,7 @@ void fit_changes(HistoryInterval& interval, const Environment& environment) noex
         &physics::Forcing::environment_k, &physics::Forcing::stated_film_w_m2_k,
         &physics::Forcing::stated_film_frac, &physics::Forcing::wind_m_s,
         &physics::Forcing::wind_to_east, &physics::Forcing::wind_to_north,
-        &physics::Forcing::cloud_frac}) {
+        &physics::Forcing::gust_m_s, &physics::Forcing::cloud_frac}) {
     double mean = 0.0;
     double moment = 0.0;
     double low = parts[0].*value;

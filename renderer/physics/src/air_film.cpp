@@ -96,7 +96,8 @@ AirFlow air_flow(const Forcing& weather) noexcept {
   // undirected.
   const double known = std::min(std::hypot(weather.wind_to_east, weather.wind_to_north), 1.0);
   flow.flow_m_s = weather.wind_m_s * glm::dvec3(weather.wind_to_east, weather.wind_to_north, 0.0);
-  flow.undirected_m_s = weather.wind_m_s * std::sqrt(1.0 - known * known);
+  flow.undirected_m_s =
+      std::hypot(weather.wind_m_s * std::sqrt(1.0 - known * known), weather.gust_m_s);
   flow.stated_w_m2_k = weather.stated_film_w_m2_k;
   flow.stated_frac = weather.stated_film_frac;
   return flow;

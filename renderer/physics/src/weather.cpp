@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "emit/physics/air_film.hpp"
 #include "emit/physics/check.hpp"
+#include "emit/physics/gusts.hpp"
 
 namespace emit::physics {
 namespace {
@@ -71,6 +73,18 @@ Forcing forcing_from_rows(std::span<const WeatherSample> rows, std::int64_t sim_
   return f;
 }
 
+Forcing at_place(Forcing forcing, const GeoPlace& place, const SunPosition& sun) noexcept {
+  forcing.height_m = place.height.value();
+  const double direct_w_m2 =
+      forcing.direct_normal_w_m2 * (1.0 - forcing.cloud_frac) * std::max(0.0, sun.direction_enu.z);
+  forcing.gust_m_s =
+      convective_gust_m_s({.global_sun_w_m2 = direct_w_m2 + forcing.diffuse_horizontal_w_m2,
+                           .longwave_down_w_m2 = forcing.longwave_down_w_m2,
+                           .air_k = forcing.air_k,
+                           .pressure_pa = standard_pressure_pa(forcing.height_m)});
+  return forcing;
+}
+
 Forcing forcing_from_clear_sky(const ClearSky& model, const GeoPlace& place, const SunPosition& sun,
                                std::int64_t posix_utc_ns) noexcept {
   const SolarIrradiance solar = clear_sky_irradiance(sun, place.height, model.linke_turbidity);
@@ -85,9 +99,8 @@ Forcing forcing_from_clear_sky(const ClearSky& model, const GeoPlace& place, con
   f.environment_k = air.value();
   f.wind_m_s = model.wind_m_s;
   set_wind_direction(model.wind_from_rad, f);
-  f.height_m = place.height.value();
   f.cloud_frac = model.cloud_frac;
-  return f;
+  return at_place(f, place, sun);
 }
 
 }  // namespace emit::physics

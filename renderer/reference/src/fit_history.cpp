@@ -170,7 +170,7 @@ std::vector<GroundForcing> ground_forcing(const scene::ScenarioDesc& scenario, d
     const physics::SunPosition sun = physics::sun_position(utc_ns, place);
     const physics::Forcing f =
         rows.empty() ? physics::forcing_from_clear_sky(scenario.clear_sky, place, sun, utc_ns)
-                     : physics::forcing_from_rows(rows, sim_ns);
+                     : physics::at_place(physics::forcing_from_rows(rows, sim_ns), place, sun);
     out.push_back({time_s,
                    f.direct_normal_w_m2 * (1.0 - f.cloud_frac) * std::max(0.0, sun.direction_enu.z),
                    f.diffuse_horizontal_w_m2, f.longwave_down_w_m2, physics::typical_film_w_m2_k(f),

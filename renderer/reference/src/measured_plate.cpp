@@ -10,6 +10,7 @@
 
 #include "emit/physics/air_film.hpp"
 #include "emit/physics/constants.hpp"
+#include "emit/physics/gusts.hpp"
 #include "emit/reference/layer_mesh.hpp"
 #include "emit/reference/layer_solver.hpp"
 
@@ -38,45 +39,18 @@ constexpr std::array<Range, 4> kRanges{{{0.0, 1.0, 0.01, "absorptance"},
                                         {0.05, 20.0, 0.02, "film"},
                                         {150.0, 400.0, 1.0, "base"}}};
 
-/// Air over a row, and its film without gusts.
-struct RowAir {
-  physics::AirFlow flow;
-  physics::AirFilm film;
-};
-
 /// Returns the film of level ground, W m-2 K-1, before its factor.
 double level_film_w_m2_k(const physics::AirFilm& film, double roughness, double excess_k) {
   return physics::film_w_m2_k(film, glm::dvec3(0.0, 0.0, 1.0), roughness, excess_k);
-}
-
-/// Returns the same with the gusts that its own heat makes.
-double gusty_film_w_m2_k(physics::AirFlow flow, double roughness, double excess_k) {
-  constexpr double kMixedM = 1000.0;
-  constexpr double kGustShare = 1.2;
-  constexpr double kGravityMS2 = 9.80665;
-  constexpr double kAirCapacityJKgK = 1005.0;
-  const double wind_m_s = flow.undirected_m_s;
-  const double capacity_j_m3_k =
-      kAirCapacityJKgK * physics::air_properties(flow.air_k, flow.pressure_pa).density_kg_m3;
-  double film_w_m2_k = level_film_w_m2_k(physics::air_film(flow), roughness, excess_k);
-  // The film depends on the gust as its 0.9th power and the gust on the film as its cube root, so
-  // that a pass leaves less than a third of the error.
-  for (int pass = 0; pass < 5; ++pass) {
-    const double stir_m_s = std::cbrt(kGravityMS2 / flow.air_k * film_w_m2_k *
-                                      std::max(excess_k, 0.0) / capacity_j_m3_k * kMixedM);
-    flow.undirected_m_s = std::hypot(wind_m_s, kGustShare * stir_m_s);
-    film_w_m2_k = level_film_w_m2_k(physics::air_film(flow), roughness, excess_k);
-  }
-  return film_w_m2_k;
 }
 
 /// Face under the weather between two rows.
 class PlateFace final : public FaceModel {
  public:
   PlateFace(const PlateNumbers& numbers, const PlateSetup& setup)
-      : numbers_(&numbers), roughness_(setup.roughness), gusts_(setup.gusts) {}
-  void between(const LoggerRow& a, const RowAir& a_air, const LoggerRow& b, const RowAir& b_air,
-               double start_s, double end_s) {
+      : numbers_(&numbers), roughness_(setup.roughness) {}
+  void between(const LoggerRow& a, const physics::AirFilm& a_air, const LoggerRow& b,
+               const physics::AirFilm& b_air, double start_s, double end_s) {
     a_ = &a;
     b_ = &b;
     a_air_ = &a_air;
@@ -101,23 +75,17 @@ class PlateFace final : public FaceModel {
 
  private:
   [[nodiscard]] double film_at(double f, double excess_k) const noexcept {
-    const double film_w_m2_k =
-        gusts_ && excess_k > 0.0
-            ? gusty_film_w_m2_k(physics::between_flows(a_air_->flow, b_air_->flow, f), roughness_,
-                                excess_k)
-            : level_film_w_m2_k(physics::between_films(a_air_->film, b_air_->film, f), roughness_,
-                                excess_k);
-    return numbers_->film_factor * film_w_m2_k;
+    return numbers_->film_factor *
+           level_film_w_m2_k(physics::between_films(*a_air_, *b_air_, f), roughness_, excess_k);
   }
   const PlateNumbers* numbers_;
   double roughness_;
-  bool gusts_;
   double start_s_ = 0.0;
   double end_s_ = 1.0;
   const LoggerRow* a_ = nullptr;
   const LoggerRow* b_ = nullptr;
-  const RowAir* a_air_ = nullptr;
-  const RowAir* b_air_ = nullptr;
+  const physics::AirFilm* a_air_ = nullptr;
+  const physics::AirFilm* b_air_ = nullptr;
 };
 
 Result<void> check(const PlateSetup& setup, std::span<const LoggerRow> rows) {
@@ -155,21 +123,10 @@ Result<void> check(const PlateNumbers& numbers) {
       fmt::format("emissivity is {}, must be above 0 and at most 1", numbers.emissivity_frac));
 }
 
-std::vector<RowAir> airs_of(const PlateSetup& setup, std::span<const LoggerRow> rows) {
-  std::vector<RowAir> airs;
+std::vector<physics::AirFilm> airs_of(const PlateSetup& setup, std::span<const LoggerRow> rows) {
+  std::vector<physics::AirFilm> airs;
   airs.reserve(rows.size());
-  const double pressure_pa = physics::standard_pressure_pa(setup.height_m);
-  for (const LoggerRow& row : rows) {
-    physics::AirFlow flow;
-    flow.air_k = row.air_k;
-    flow.pressure_pa = pressure_pa;
-    flow.undirected_m_s = row.wind_m_s;
-    if (row.film_w_m2_k > 0.0) {
-      flow.stated_w_m2_k = row.film_w_m2_k;
-      flow.stated_frac = 1.0;
-    }
-    airs.push_back({flow, physics::air_film(flow)});
-  }
+  for (const LoggerRow& row : rows) airs.push_back(physics::air_film(air_flow(setup, row)));
   return airs;
 }
 
@@ -216,7 +173,8 @@ Result<void> run_days(const PlateSetup& setup, std::span<const LoggerRow> rows,
 
 /// @pre both checks passed
 Result<std::vector<double>> run_plate(const PlateSetup& setup, std::span<const LoggerRow> rows,
-                                      std::span<const RowAir> airs, const PlateNumbers& numbers) {
+                                      std::span<const physics::AirFilm> airs,
+                                      const PlateNumbers& numbers) {
   PlateFace face(numbers, setup);
   std::vector<double> out_k;
   out_k.reserve(rows.size());
@@ -408,7 +366,7 @@ class Search {
   const PlateSetup& setup_;
   std::span<const LoggerRow> rows_;
   std::span<const PlateNumber> free_;
-  std::vector<RowAir> airs_;
+  std::vector<physics::AirFilm> airs_;
   Eigen::Index count_;
 };
 
@@ -471,17 +429,29 @@ Result<std::vector<double>> ground_heat_w_m2(const PlateSetup& setup,
   return out_w_m2;
 }
 
+physics::AirFlow air_flow(const PlateSetup& setup, const LoggerRow& row) noexcept {
+  physics::AirFlow flow;
+  flow.air_k = row.air_k;
+  flow.pressure_pa = physics::standard_pressure_pa(setup.height_m);
+  flow.undirected_m_s = std::hypot(
+      row.wind_m_s, physics::convective_gust_m_s({.global_sun_w_m2 = row.sun_w_m2,
+                                                  .longwave_down_w_m2 = row.longwave_down_w_m2,
+                                                  .air_k = row.air_k,
+                                                  .pressure_pa = flow.pressure_pa}));
+  flow.stated_w_m2_k = row.film_w_m2_k;
+  flow.stated_frac = row.film_w_m2_k > 0.0 ? 1.0 : 0.0;
+  return flow;
+}
+
 std::vector<double> measured_films_w_m2_k(const PlateSetup& setup, std::span<const LoggerRow> rows,
                                           const PlateNumbers& numbers) {
-  const std::vector<RowAir> airs = airs_of(setup, rows);
+  const std::vector<physics::AirFilm> airs = airs_of(setup, rows);
   std::vector<double> out_w_m2_k;
   out_w_m2_k.reserve(rows.size());
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const double excess_k = rows[i].surface_k - rows[i].air_k;
     out_w_m2_k.push_back(numbers.film_factor *
-                         (setup.gusts && excess_k > 0.0
-                              ? gusty_film_w_m2_k(airs[i].flow, setup.roughness, excess_k)
-                              : level_film_w_m2_k(airs[i].film, setup.roughness, excess_k)));
+                         level_film_w_m2_k(airs[i], setup.roughness, excess_k));
   }
   return out_w_m2_k;
 }

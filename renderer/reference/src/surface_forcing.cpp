@@ -40,11 +40,11 @@ struct Weather {
   [[nodiscard]] ClimateNode at(std::int64_t time_ns, bool before, bool& stated) const {
     // Evaluate the input models.
     const physics::SunPosition sun = physics::sun_position(epoch_utc_ns + time_ns, place);
-    physics::Forcing forcing =
+    const physics::Forcing forcing =
         rows.empty()
             ? physics::forcing_from_clear_sky(clear_sky, place, sun, epoch_utc_ns + time_ns)
-            : physics::forcing_from_rows(rows, before ? time_ns - 1 : time_ns);
-    forcing.height_m = place.height.value();
+            : physics::at_place(physics::forcing_from_rows(rows, before ? time_ns - 1 : time_ns),
+                                place, sun);
     ClimateNode node;
     node.time_ns = time_ns;
     node.to_sun = sun.direction_enu;

@@ -119,12 +119,7 @@ Json day_json(const NatureDay& day) {
   }
   fitted.set("estimates", std::move(estimates));
   out.set("two_fitted", std::move(fitted));
-  out.set("gusts", day.ground.setup.gusts);
-  return out.set(day.ground.setup.gusts ? "without_gusts" : "with_gusts",
-                 Json::object()
-                     .set("nothing_fitted", json_of(day.other_library))
-                     .set("two_fitted", json_of(day.other_fitted))
-                     .set("fitted_numbers", numbers_json(day.other_numbers)));
+  return out;
 }
 
 void print_day(std::FILE* out, const NatureDay& day) {
@@ -144,12 +139,6 @@ void print_day(std::FILE* out, const NatureDay& day) {
   table.add({"nothing fitted, real-time model", fmt::format("{:.2f}", day.real_time.rms_k), "",
              fmt::format("{:+.2f}", day.real_time.bias_k),
              fmt::format("{:.2f}", day.real_time.max_k), ""});
-  const char* const other_name = day.ground.setup.gusts ? "without gusts" : "with gusts";
-  for (const auto& [name, d] : {std::pair{"nothing fitted", &day.other_library},
-                                std::pair{"inertia and base fitted", &day.other_fitted}}) {
-    table.add({fmt::format("{}, {}", name, other_name), fmt::format("{:.2f}", d->rms_k), "",
-               fmt::format("{:+.2f}", d->bias_k), fmt::format("{:.2f}", d->max_k), ""});
-  }
   fmt::print(out, "{}", table.to_string());
   std::string hours;
   for (const double max_k : day.library.difference.max_by_hour_k) {

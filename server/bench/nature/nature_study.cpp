@@ -155,15 +155,10 @@ class RealTimePlate {
  private:
   [[nodiscard]] physics::FosterDrive<double> drive(const LoggerRow& row, double before_k) const {
     const reference::PlateNumbers& n = ground_.numbers;
-    physics::AirFlow flow;
-    flow.air_k = row.air_k;
-    flow.pressure_pa = physics::standard_pressure_pa(ground_.setup.height_m);
-    flow.undirected_m_s = row.wind_m_s;
-    flow.stated_w_m2_k = row.film_w_m2_k;
-    flow.stated_frac = row.film_w_m2_k > 0.0 ? 1.0 : 0.0;
     const double film_w_m2_k =
-        n.film_factor * physics::film_w_m2_k(physics::air_film(flow), {0.0, 0.0, 1.0},
-                                             ground_.setup.roughness, before_k - row.air_k);
+        n.film_factor *
+        physics::film_w_m2_k(physics::air_film(reference::air_flow(ground_.setup, row)),
+                             {0.0, 0.0, 1.0}, ground_.setup.roughness, before_k - row.air_k);
     return {n.absorptance_frac * row.sun_w_m2 + n.emissivity_frac * row.longwave_down_w_m2,
             film_w_m2_k, row.air_k - surface_.reference_k};
   }
@@ -282,15 +277,6 @@ Result<NatureDay> study_day(const std::filesystem::path& file, const LoggerOptio
   const auto real_time_k = real_time_history_k(day.record, day.ground);
   if (!real_time_k) return named(real_time_k.error());
   day.real_time = difference_of(day.record, *real_time_k);
-  MeasuredGround other = day.ground;
-  other.setup.gusts = !other.setup.gusts;
-  for (const bool is_fitted : {false, true}) {
-    const auto run = run_model(day.record, other, is_fitted);
-    if (!run) return named(run.error());
-    on_run();
-    (is_fitted ? day.other_fitted : day.other_library) = difference_of(day.record, run->model_k);
-    day.other_numbers = run->numbers;
-  }
   const auto heat = day_heat(day.record, day.ground);
   if (!heat) return named(heat.error());
   day.heat = *heat;
@@ -301,7 +287,7 @@ Result<NatureDay> study_day(const std::filesystem::path& file, const LoggerOptio
 std::size_t study_runs() noexcept {
   const auto of_ground = static_cast<std::size_t>(
       std::ranges::count_if(kInputs, [](const Input& input) { return input.ground; }));
-  return 4 + 4 * std::size(kInputs) - 2 * of_ground;
+  return 2 + 4 * std::size(kInputs) - 2 * of_ground;
 }
 
 }  // namespace emit::tool

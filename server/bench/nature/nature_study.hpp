@@ -46,10 +46,6 @@ struct NatureDay {
   Difference real_time;
   NatureCase fitted;        ///< inertia and base fitted; refitted for every change of an input
   reference::PlateFit fit;  ///< of the case `fitted` without a change
-  // The same two cases with gusts of convection, or without them if the options ask for gusts.
-  Difference other_library;
-  Difference other_fitted;
-  reference::PlateNumbers other_numbers;
 };
 
 /// Runs a day. `on_run` is called after every run and fit. Errors: those of read_logger(),

@@ -76,7 +76,8 @@ physics::Forcing forcing_at(const scene::ScenarioDesc& scenario, std::int64_t si
                                            sun_at(scenario, sim_time_ns),
                                            scenario.epoch_utc_ns + sim_time_ns);
   }
-  return physics::forcing_from_rows(scenario.weather, sim_time_ns);
+  return physics::at_place(physics::forcing_from_rows(scenario.weather, sim_time_ns),
+                           place_of(scenario), sun_at(scenario, sim_time_ns));
 }
 
 }  // namespace

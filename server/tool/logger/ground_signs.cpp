@@ -115,7 +115,7 @@ void add_signs_of_moisture(const LoggerRecord& record, const DayHeat& heat,
     signs.push_back(
         {"evaporation",
          fmt::format("by day {:.0f} of {:.0f} W/m2 of net radiation go neither to the air ({:.0f}) "
-                     "nor into dry layers ({:.0f}), and {:.0f} with gusts, a film 30 % and an "
+                     "nor into dry layers ({:.0f}), and {:.0f} with a film 30 % and an "
                      "inertia 40 % greater: evaporation is likely, "
                      "unless the ground is another one",
                      heat.missing_w_m2, heat.net_radiation_w_m2, heat.to_air_w_m2,
@@ -146,7 +146,6 @@ physics::Result<DayHeat> day_heat(const LoggerRecord& record, const MeasuredGrou
   MeasuredGround most = ground;
   most.numbers.inertia_factor *= 1.4;
   most.numbers.film_factor *= 1.3;
-  most.setup.gusts = true;
   const auto into_ground = reference::ground_heat_w_m2(ground.setup, record.rows, ground.numbers);
   if (!into_ground) return tl::unexpected(into_ground.error());
   const auto into_most = reference::ground_heat_w_m2(most.setup, record.rows, most.numbers);

@@ -24,7 +24,7 @@ struct DayHeat {
   double to_ground_w_m2 = 0.0;  ///< into dry layers whose face follows the measured surface
   /// Heat that neither air nor ground takes: evaporation, or an error of the rest.
   double missing_w_m2 = 0.0;
-  double least_missing_w_m2 = 0.0;  ///< with gusts, a film 30 % and an inertia 40 % greater
+  double least_missing_w_m2 = 0.0;  ///< with a film 30 % and an inertia 40 % greater
 };
 /// Errors: those of reference::plate_history_k().
 [[nodiscard]] physics::Result<DayHeat> day_heat(const LoggerRecord& record,

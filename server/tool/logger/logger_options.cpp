@@ -40,10 +40,7 @@ std::vector<Option> add_ground_options(CommandLine& line, GroundOptions& options
           line.option("--base-k", options.base_k,
                       "Temperature below the last layer; default: that of the material, by place "
                       "and date for ground")
-              .in_range(150.0, 400.0),
-          line.flag("--gusts", options.gusts,
-                    "Add the gusts of convection to the wind (Beljaars 1995); the real-time model "
-                    "has none")};
+              .in_range(150.0, 400.0)};
 }
 
 PlotSeries record_series(std::string label, const LoggerRecord& record,

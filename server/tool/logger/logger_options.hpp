@@ -11,7 +11,7 @@ namespace emit::tool {
 
 /// Adds --column, --lat-deg, --lon-deg, --height-m, --date, --surface, and returns them.
 std::vector<Option> add_logger_options(CommandLine& line, LoggerOptions& options);
-/// Adds --absorptance, --emissivity, --base-k, --gusts, and returns them.
+/// Adds --absorptance, --emissivity, --base-k, and returns them.
 std::vector<Option> add_ground_options(CommandLine& line, GroundOptions& options);
 
 /// Returns a curve over the hours of the record, thinned to at most 600 points.

@@ -76,7 +76,6 @@ Result<MeasuredGround> measured_ground(const GroundOptions& options, LoggerRecor
   out.material = std::move(*material);
   out.setup.layers = out.material.layers;
   out.setup.roughness = scene::roughness_factor(out.material.roughness);
-  out.setup.gusts = options.gusts;
   out.setup.height_m = record.height_m.value_or(0.0);
 
   out.numbers.emissivity_frac = options.emissivity_frac.value_or(out.material.emissivity_frac);
@@ -102,9 +101,10 @@ Result<MeasuredGround> measured_ground(const GroundOptions& options, LoggerRecor
           std::ranges::any_of(record.rows,
                               [](const reference::LoggerRow& row) { return row.film_w_m2_k > 0.0; })
               ? "of the record"
-              : fmt::format("from wind{} and temperatures, air of {:.0f} m "
-                            "above the sea",
-                            out.setup.gusts ? ", gusts of convection" : "", out.setup.height_m))};
+              : fmt::format(
+                    "from wind, gusts of convection and temperatures, air of {:.0f} m above "
+                    "the sea",
+                    out.setup.height_m))};
   return out;
 }
 

@@ -19,7 +19,6 @@ struct GroundOptions {
   std::optional<double> absorptance_frac;
   std::optional<double> emissivity_frac;
   std::optional<double> base_k;
-  bool gusts = false;  ///< see reference::PlateSetup
 };
 
 struct MeasuredGround {

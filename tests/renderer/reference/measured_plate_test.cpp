@@ -12,6 +12,7 @@
 
 #include "emit/physics/air_film.hpp"
 #include "emit/physics/constants.hpp"
+#include "emit/physics/gusts.hpp"
 
 namespace emit::reference {
 namespace {
@@ -77,7 +78,8 @@ TEST(MeasuredPlate, constant_weather_ends_in_balance) {
   physics::AirFlow flow;
   flow.air_k = 290.0;
   flow.pressure_pa = physics::standard_pressure_pa(setup.height_m);
-  flow.undirected_m_s = 3.0;
+  flow.undirected_m_s =
+      std::hypot(3.0, physics::convective_gust_m_s({400.0, 320.0, 290.0, flow.pressure_pa}));
   const physics::AirFilm film = physics::air_film(flow);
   double low_k = 250.0;
   double high_k = 350.0;

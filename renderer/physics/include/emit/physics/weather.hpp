@@ -56,16 +56,24 @@ struct Forcing {
   /// different directions, and 0 if it is not known.
   double wind_to_east = 0.0;
   double wind_to_north = 0.0;
-  double height_m = 0.0;  ///< of the place; the caller sets it
+  /// Gusts that convection adds in squares to the wind (gusts.hpp).
+  double gust_m_s = 0.0;
+  double height_m = 0.0;  ///< of the place
   double cloud_frac = 0.0;
 };
 
 /// Returns the forcing at a time: linear between rows, constant before the first and after the
 /// last. Two rows with the same time make a jump, and the later row holds from that instant on. If
-/// only one of two neighbours states `environment_k`, the other one takes it from its model.
+/// only one of two neighbours states `environment_k`, the other one takes it from its model. Height
+/// and gusts are 0, see at_place().
 /// @pre rows is not empty and ascending in time.
 [[nodiscard]] Forcing forcing_from_rows(std::span<const WeatherSample> rows,
                                         std::int64_t sim_time_ns) noexcept;
+
+/// Returns the forcing with the height of the place, and the gusts that its land makes under that
+/// sun.
+[[nodiscard]] Forcing at_place(Forcing forcing, const GeoPlace& place,
+                               const SunPosition& sun) noexcept;
 
 /// Returns the forcing of a clear sky at a place and an instant (POSIX ns UTC). `sun` is the sun's
 /// position at that place and instant.

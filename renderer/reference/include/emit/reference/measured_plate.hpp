@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "emit/physics/air_film.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/scene/scene_desc.hpp"
 
@@ -38,10 +39,6 @@ struct PlateSetup {
   std::vector<scene::Layer> layers;  ///< outermost first
   double roughness = 1.52;           ///< factor of scene::roughness_factor()
   double height_m = 0.0;             ///< of the place above the sea; sets the air's density
-  /// Adds the gusts of convection to the wind: a layer of air of 1000 m that the ground warms stirs
-  /// itself by w = (g / T H / (rho c) 1000 m)^1/3, and 1.2 w adds to the mean wind in squares
-  /// (Beljaars, Quart. J. Roy. Meteor. Soc. 121, 1995). The real-time model has none.
-  bool gusts = false;
   /// Number of times that the first day is repeated before the record. The profile begins steady
   /// between the mean of the air and the base.
   std::uint32_t spin_up_days = 5;
@@ -60,6 +57,9 @@ struct PlateSetup {
 [[nodiscard]] physics::Result<std::vector<double>> ground_heat_w_m2(const PlateSetup& setup,
                                                                     std::span<const LoggerRow> rows,
                                                                     const PlateNumbers& numbers);
+
+/// Returns the flow of the air over a row: its wind with the gusts of convection (gusts.hpp).
+[[nodiscard]] physics::AirFlow air_flow(const PlateSetup& setup, const LoggerRow& row) noexcept;
 
 /// Returns the film between the air and the measured surface at every row, W m-2 K-1.
 [[nodiscard]] std::vector<double> measured_films_w_m2_k(const PlateSetup& setup,
