@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "passes/geometry_pass.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
 #include <vector>
 
 #include "draw/image_window.hpp"
+#include "emit/physics/check.hpp"
 #include "passes/render_target.hpp"
 
 namespace emit::renderer {
@@ -17,6 +21,13 @@ namespace {
 /// triangles into screen tiles on the caller's thread, and its other threads fill the tiles
 /// meanwhile, but only with commands that were flushed.
 constexpr std::int32_t kSoftwareBatchIndices = 12'000;
+
+/// GLSL type and texture of one value by band.
+struct BandsType {
+  const char* glsl;
+  const char* swizzle;  ///< of a vec4
+  GLenum format;
+};
 
 /// Issues one multi-draw per record.
 void issue_at_once(std::span<const ViewDraw> draws, const ViewRanges& ranges,
@@ -56,24 +67,39 @@ void issue_in_batches(std::span<const ViewDraw> draws, const ViewRanges& ranges,
 }  // namespace
 
 physics::Result<GeometryPass> GeometryPass::create(const gl::EglContext& context,
-                                                   std::uint32_t width_px, std::uint32_t height_px,
-                                                   Content content, Shade shade) {
+                                                   const Setup& setup) {
+  EMIT_CHECK_OP(setup.bands, >=, 1U);
+  EMIT_CHECK_OP(setup.bands, <=, std::uint32_t{EMIT_MAX_BANDS});
   GeometryPass pass;
   pass.software_ = context.software();
   pass.threads_ = context.threads();
   // Compile the program for the content.
   std::vector<gl::Define> defines;
-  const bool sampled = content != Content::normals;
-  const bool objects = content == Content::samples_and_objects;
-  if (sampled) defines.push_back({"EMIT_CACHED", "1"});
+  const bool sampled = setup.content != Content::normals;
+  const bool objects = setup.content == Content::samples_and_objects;
+  if (sampled) {
+    // A texture has one, two or four components.
+    constexpr std::array<BandsType, EMIT_MAX_BANDS> kTypes{{{"float", "x", GL_R32F},
+                                                            {"vec2", "xy", GL_RG32F},
+                                                            {"vec4", "xyzw", GL_RGBA32F},
+                                                            {"vec4", "xyzw", GL_RGBA32F}}};
+    const BandsType& type = kTypes[setup.bands - 1];
+    defines.push_back({"EMIT_CACHED", "1"});
+    defines.push_back({"EMIT_BANDS", fmt::format("{}u", setup.bands)});
+    defines.push_back({"EMIT_BANDS_VEC", type.glsl});
+    defines.push_back({"EMIT_BANDS_OF(v)", fmt::format("(v).{}", type.swizzle)});
+    pass.incoming_ = gl::Texture(type.format, static_cast<GLsizei>(setup.width_px),
+                                 static_cast<GLsizei>(setup.height_px));
+    if (setup.seen) defines.push_back({"EMIT_SEEN", "1"});
+  }
   if (objects) defines.push_back({"EMIT_OBJECTS", "1"});
-  if (shade == Shade::of_entities) defines.push_back({"EMIT_SHADE", "1"});
+  if (setup.shade == Shade::of_entities) defines.push_back({"EMIT_SHADE", "1"});
   auto program = gl::Program::graphics("passes/geometry.vert", "passes/geometry.frag", defines);
   if (!program) return tl::unexpected(std::move(program.error()));
   pass.program_ = std::move(*program);
   // Make the textures of the content and attach them.
-  const auto width = static_cast<GLsizei>(width_px);
-  const auto height = static_cast<GLsizei>(height_px);
+  const auto width = static_cast<GLsizei>(setup.width_px);
+  const auto height = static_cast<GLsizei>(setup.height_px);
   pass.sampled_ = sampled;
   pass.depth_buffer_ = gl::Texture(GL_DEPTH_COMPONENT32F, width, height);
   pass.framebuffer_ = gl::Framebuffer::make();
@@ -82,12 +108,13 @@ physics::Result<GeometryPass> GeometryPass::create(const gl::EglContext& context
   if (sampled) {
     pass.surface_ = gl::Texture(GL_RG32UI, width, height);
     glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT0, pass.surface_.id(), 0);
+    glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT1, pass.incoming_.id(), 0);
     if (objects) {
       pass.ids_ = gl::Texture(GL_R16UI, width, height);
-      glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT1, pass.ids_.id(), 0);
+      glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT2, pass.ids_.id(), 0);
     }
-    const GLenum targets[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
-    glNamedFramebufferDrawBuffers(id, objects ? 2 : 1, targets);
+    const GLenum targets[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1, GL_COLOR_ATTACHMENT2};
+    glNamedFramebufferDrawBuffers(id, objects ? 3 : 2, targets);
   } else {
     pass.depth_m_ = gl::Texture(GL_R32F, width, height);
     pass.normal_ = gl::Texture(GL_RG16_SNORM, width, height);
@@ -156,6 +183,7 @@ void GeometryPass::bind_textures() const noexcept {
   if (sampled_) {
     depth_buffer_.bind(EMIT_TEX_DEPTH);
     surface_.bind(EMIT_TEX_SURFACE);
+    incoming_.bind(EMIT_TEX_INCOMING);
     glBindImageTexture(EMIT_IMG_SURFACE, surface_.id(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RG32UI);
     if (ids_.id() != 0) ids_.bind(EMIT_TEX_IDS);
     return;

@@ -29,12 +29,19 @@ class GeometryPass {
   };
   /// Shade that vertices of samples bring along (SceneVertexArrays::read_shade).
   enum class Shade : std::uint8_t { none, of_entities };
-  /// Compiles the pass and makes the geometry buffer for images of up to `width_px` x `height_px`.
-  /// Errors: gpu (names the shader or the render target).
+  /// What the geometry buffer is made for.
+  struct Setup {
+    std::uint32_t width_px = 0;
+    std::uint32_t height_px = 0;
+    Content content = Content::normals;
+    Shade shade = Shade::none;
+    std::uint32_t bands = 1;  ///< of the incoming radiance that samples have
+    bool seen = false;        ///< vertices of samples have SceneVertexArrays::read_seen
+  };
+  /// Compiles the pass and makes the geometry buffer for images of up to the size of `setup`.
+  /// Errors: gpu (names the shader or the render target). @pre 1 <= setup.bands <= EMIT_MAX_BANDS
   [[nodiscard]] static physics::Result<GeometryPass> create(const gl::EglContext& context,
-                                                            std::uint32_t width_px,
-                                                            std::uint32_t height_px,
-                                                            Content content, Shade shade);
+                                                            const Setup& setup);
   /// One view and its place in the geometry buffer.
   struct View {
     CommandRange single_sided;  ///< parts of the camera's draws
@@ -57,7 +64,8 @@ class GeometryPass {
   gl::Texture depth_m_;
   gl::Texture normal_;
   gl::Texture ids_;
-  gl::Texture surface_;  ///< state of samples as passes/surface_texel.glsl packs it
+  gl::Texture surface_;   ///< state of samples as passes/surface_texel.glsl packs it
+  gl::Texture incoming_;  ///< radiance that arrives at samples, by band
   gl::Texture depth_buffer_;
   gl::Framebuffer framebuffer_;
   bool sampled_ = false;

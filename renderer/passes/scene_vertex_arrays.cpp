@@ -61,6 +61,20 @@ void SceneVertexArrays::read_nodes(const gl::Buffer& before,
   read(EMIT_ATTR_NODE_AFTER, 4, after);
 }
 
+void SceneVertexArrays::read_seen(const gl::Buffer& before, const gl::Buffer& after,
+                                  std::uint32_t bands) const noexcept {
+  const auto read = [&](GLuint attribute, GLuint binding, const gl::Buffer& node) {
+    glVertexArrayVertexBuffer(view_.id(), binding, node.id(), 0,
+                              static_cast<GLsizei>(bands * sizeof(float)));
+    glVertexArrayAttribFormat(view_.id(), attribute, static_cast<GLint>(bands), GL_FLOAT, GL_FALSE,
+                              0);
+    glVertexArrayAttribBinding(view_.id(), attribute, binding);
+    glEnableVertexArrayAttrib(view_.id(), attribute);
+  };
+  read(EMIT_ATTR_SEEN_BEFORE, 7, before);
+  read(EMIT_ATTR_SEEN_AFTER, 8, after);
+}
+
 void SceneVertexArrays::read_shade(const gl::Buffer& shade) const noexcept {
   constexpr GLuint kBinding = 5;
   glVertexArrayVertexBuffer(view_.id(), kBinding, shade.id(), 0, sizeof(float));

@@ -18,6 +18,10 @@ class SceneVertexArrays {
   /// Sets the buffers that the camera's draws read the samples from, at the node of time before the
   /// frame and at the node after it: two floats per vertex in each.
   void read_nodes(const gl::Buffer& before, const gl::Buffer& after) const noexcept;
+  /// Sets the buffers that the camera's draws read from what other samples send in band, at the
+  /// same nodes: `bands` floats per vertex in each.
+  void read_seen(const gl::Buffer& before, const gl::Buffer& after,
+                 std::uint32_t bands) const noexcept;
   /// Sets the buffer that the camera's draws read the recent shade of entities from: one float per
   /// vertex.
   void read_shade(const gl::Buffer& shade) const noexcept;

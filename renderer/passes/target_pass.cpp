@@ -33,9 +33,10 @@ glm::uvec2 tile_at(std::size_t target) noexcept {
 
 }  // namespace
 
-physics::Result<TargetPass> TargetPass::create(const gl::EglContext& context, std::uint32_t bands,
+physics::Result<TargetPass> TargetPass::create(const gl::EglContext& context,
                                                std::uint32_t planes, bool coverage,
-                                               GeometryPass::Shade shade) {
+                                               GeometryPass::Setup setup) {
+  const std::uint32_t bands = setup.bands;
   EMIT_CHECK_OP(bands, <=, planes);
   TargetPass pass;
   const std::vector<gl::Define> defines{{"EMIT_BANDS", fmt::format("{}u", bands)},
@@ -47,8 +48,10 @@ physics::Result<TargetPass> TargetPass::create(const gl::EglContext& context, st
   auto pixels = gl::Program::compute("passes/target_pixels.comp", defines);
   if (!pixels) return tl::unexpected(std::move(pixels.error()));
   pass.pixels_program_ = std::move(*pixels);
-  auto geometry = GeometryPass::create(context, kBufferSamples.x, kBufferSamples.y,
-                                       GeometryPass::Content::samples_and_objects, shade);
+  setup.width_px = kBufferSamples.x;
+  setup.height_px = kBufferSamples.y;
+  setup.content = GeometryPass::Content::samples_and_objects;
+  auto geometry = GeometryPass::create(context, setup);
   if (!geometry) return tl::unexpected(std::move(geometry.error()));
   pass.geometry_.push_back(std::move(*geometry));
   // Allocate the buffers for the largest number of targets.

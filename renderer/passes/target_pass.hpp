@@ -25,12 +25,12 @@ namespace emit::renderer {
 /// RT-safe.
 class TargetPass {
  public:
-  /// Compiles the pass for `bands` planes of radiance among `planes`; with `coverage` one plane
-  /// follows that holds the share of targets. `shade` is that of the camera's geometry pass.
+  /// Compiles the pass for `planes`, of which the first are those of the bands; with `coverage` one
+  /// plane follows that holds the share of targets. `setup` is that of the camera's geometry pass.
   /// Errors: gpu (names the shader or the render target).
   [[nodiscard]] static physics::Result<TargetPass> create(const gl::EglContext& context,
-                                                          std::uint32_t bands, std::uint32_t planes,
-                                                          bool coverage, GeometryPass::Shade shade);
+                                                          std::uint32_t planes, bool coverage,
+                                                          GeometryPass::Setup setup);
   /// Takes the windows of a frame. `frame` is complete.
   /// @pre At most EMIT_MAX_TARGETS windows.
   void prepare(std::span<const TargetWindow> windows, const ViewVolume& view,

@@ -125,6 +125,7 @@ class GlRenderer final : public Renderer {
   /// Sets the thermal method, which reads history(). It is called before anything else.
   void set_stage(std::unique_ptr<ThermalStage> stage) { stage_ = std::move(stage); }
   [[nodiscard]] const SceneHistory& history() const noexcept { return history_; }
+  [[nodiscard]] const BandModel& bands() const noexcept { return bands_; }
 
   std::size_t apply_entities(std::int64_t sim_time_ns,
                              std::span<const EntityUpdate> updates) noexcept override;
@@ -670,13 +671,16 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
   const std::uint32_t width_px = scenario.sensor.width_px;
   const std::uint32_t height_px = scenario.sensor.height_px;
   using Content = GeometryPass::Content;
-  auto geometry_pass =
-      GeometryPass::create(*context, width_px, height_px,
-                           !cached         ? Content::normals
-                           : output.object ? Content::samples_and_objects
-                                           : Content::samples,
-                           cached && has_entities(scenario) ? GeometryPass::Shade::of_entities
-                                                            : GeometryPass::Shade::none);
+  auto geometry_pass = GeometryPass::create(
+      *context, {.width_px = width_px,
+                 .height_px = height_px,
+                 .content = !cached         ? Content::normals
+                            : output.object ? Content::samples_and_objects
+                                            : Content::samples,
+                 .shade = cached && has_entities(scenario) ? GeometryPass::Shade::of_entities
+                                                           : GeometryPass::Shade::none,
+                 .bands = static_cast<std::uint32_t>(bands->bands()),
+                 .seen = CachedStage::sees_in_band(scenario.thermal)});
   if (!geometry_pass) return tl::unexpected(std::move(geometry_pass.error()));
   auto radiance_pass =
       RadiancePass::create(scenario.thermal, radiance_content(*bands, output), context->software());
@@ -702,10 +706,11 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
   // Create the renderer, then the thermal method, which reads its history.
   auto renderer = std::make_unique<GlRenderer>(scenario, std::move(*context), *geometry, output,
                                                std::move(*bands), std::move(passes));
-  auto stage = cached ? CachedStage::create(scenario, std::move(*geometry), std::move(*foster),
-                                            renderer->history(), renderer->software())
-                      : PerFrameStage::create(scenario, std::move(*geometry), std::move(*foster),
-                                              renderer->history());
+  auto stage =
+      cached ? CachedStage::create(scenario, std::move(*geometry), std::move(*foster),
+                                   renderer->history(), renderer->bands(), renderer->software())
+             : PerFrameStage::create(scenario, std::move(*geometry), std::move(*foster),
+                                     renderer->history());
   if (!stage) return tl::unexpected(std::move(stage.error()));
   renderer->set_stage(std::move(*stage));
   if (glGetError() != GL_NO_ERROR || !renderer->memory_mapped()) {

@@ -169,8 +169,8 @@ Result<std::unique_ptr<VisibilityProbe>> VisibilityProbe::create(
   EMIT_CHECK(thermal.shadow_map_px >= 16 && thermal.shadow_map_px <= 16384);
   auto context = gl::EglContext::create(device.gpu_index, device.debug_context);
   if (!context) return tl::unexpected(std::move(context.error()));
-  auto geometry = GeometryPass::create(*context, sensor.width_px, sensor.height_px,
-                                       GeometryPass::Content::normals, GeometryPass::Shade::none);
+  auto geometry =
+      GeometryPass::create(*context, {.width_px = sensor.width_px, .height_px = sensor.height_px});
   if (!geometry) return tl::unexpected(std::move(geometry.error()));
   auto occlusion = OcclusionPass::create(sensor.width_px, sensor.height_px);
   if (!occlusion) return tl::unexpected(std::move(occlusion.error()));

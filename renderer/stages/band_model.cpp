@@ -21,6 +21,8 @@ using physics::make_error;
 /// Number of texels that every OpenGL 4.5 device takes in a buffer texture
 /// (GL_MAX_TEXTURE_BUFFER_SIZE).
 constexpr std::size_t kMaxTableFloats = 65536;
+static_assert(kMostBands == EMIT_MAX_BANDS);
+static_assert(physics::kSkyTilts == EMIT_SKY_TILTS);
 
 /// Band with its spectral response.
 physics::Band band_from(const scene::SpectralBand& desc) {
@@ -31,16 +33,12 @@ physics::Band band_from(const scene::SpectralBand& desc) {
   return band;
 }
 
-/// Cosine-weighted mean of 1 - tau^m(elevation) over the sky, by the midpoint rule in sin^2.
-double sky_hemisphere_frac(double vertical_transmittance_frac) {
-  constexpr int kRings = 256;
-  double sum = 0.0;
-  for (int i = 0; i < kRings; ++i) {
-    const double sin_elevation = std::sqrt((i + 0.5) / kRings);
+/// Radiance of the sky by tilt over that of a blackbody, 1 - tau^m(elevation).
+physics::SkyByTilt sky_frac(double vertical_transmittance_frac) {
+  return physics::sky_by_tilt([&](double sin_elevation) {
     const double mass = physics::relative_air_mass(physics::Radians(std::asin(sin_elevation)));
-    sum += 1.0 - std::pow(vertical_transmittance_frac, mass);
-  }
-  return sum / kRings;
+    return 1.0 - std::pow(vertical_transmittance_frac, mass);
+  });
 }
 
 /// Atmosphere of a band; null where the scenario has none.
@@ -120,12 +118,13 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
   // Set up each band: its T ln L table, then the air as a table or as a sum of terms.
   BandModel model;
   for (const scene::SpectralBand& desc : scenario.bands) {
-    Entry entry{.band = band_from(desc)};
-    const auto lut = physics::BandRadianceLut::build(entry.band);
+    const physics::Band spectral = band_from(desc);
+    const auto lut = physics::BandRadianceLut::build(spectral);
     if (!lut) {
       return make_error(ErrorCode::config,
                         fmt::format("band '{}': {}", desc.name, lut.error().text));
     }
+    Entry entry{.band = spectral, .lut = *lut};
     gpu::BandParams params{};
     const auto layout = lut->shader_layout(0);
     params.lut_first_k = layout[0];
@@ -143,7 +142,8 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
                           fmt::format("band '{}': {}", desc.name, air.error().text));
       }
       model.air_table_ |= 1U << model.params_.size();
-      entry.air_hemisphere_w_m2_sr = air->sky_hemisphere_w_m2_sr();
+      entry.air_sky_w_m2_sr =
+          physics::sky_by_tilt([&](double sine) { return air->out(sine).path_radiance_w_m2_sr; });
       entry.air = std::move(*air);
     } else if (atmosphere != nullptr) {
       if (atmosphere->terms.size() > EMIT_MAX_ATMOSPHERE_TERMS) {
@@ -168,7 +168,7 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
     }
     // Compute the constants of sun and sky.
     entry.sun_outside_w_m2 = sun_outside_w_m2(desc, entry.band);
-    entry.sky_hemisphere_frac = sky_hemisphere_frac(entry.vertical_transmittance_frac);
+    entry.sky_frac = sky_frac(entry.vertical_transmittance_frac);
     entry.has_sky = atmosphere != nullptr;
     model.nodes_per_band_ = static_cast<std::uint32_t>(lut->nodes().size());
     model.tables_.insert(model.tables_.end(), lut->nodes().begin(), lut->nodes().end());
@@ -221,65 +221,104 @@ std::vector<physics::ApparentTemperature> BandModel::apparent_temperatures() con
   return out;
 }
 
+BandModel::Instant BandModel::instant_of(const physics::Forcing& forcing,
+                                         const physics::SunPosition& sun) const noexcept {
+  Instant now;
+  now.sky = physics::sky_state(forcing.longwave_down_w_m2, forcing.air_k, dew_point_k_,
+                               forcing.cloud_frac, cloud_base_);
+  now.air_k = forcing.air_k;
+  now.environment_k = forcing.environment_k;
+  // The direct sun is weaker than a clear one by what clouds and haze take from the beam.
+  now.air_mass = physics::relative_air_mass(sun.elevation);
+  if (now.air_mass > 0.0) {
+    now.beam_frac = (1.0 - forcing.cloud_frac) *
+                    physics::beam_share_frac(forcing.direct_normal_w_m2, sun,
+                                             physics::Metres(place_m_), turbidity_);
+  }
+  now.sin_sun = std::sin(sun.elevation.value());
+  now.sin_shown = std::sin(physics::apparent_elevation(sun.elevation).value());
+  now.distance_au = sun.distance_au;
+  return now;
+}
+
+double BandModel::warmer_k(const Entry& entry, const Instant& now) const noexcept {
+  // The place's air differs from that of the climate, and the difference fades upwards.
+  return (now.air_k - entry.climate_k) * std::exp(place_m_ / physics::BandAir::kWarmthScaleM);
+}
+
+double BandModel::sky_warmer_k(const Entry& entry, const Instant& now) const noexcept {
+  return warmer_k(entry, now) +
+         now.sky.warmer_k * std::exp(place_m_ / physics::BandAir::kWarmthScaleM);
+}
+
+void BandModel::light_of(const Entry& entry, const Instant& now, BandLight& out) const noexcept {
+  const auto black = [&](double kelvin) {
+    return physics::band_radiance(entry.band, physics::Kelvin(kelvin)).radiance_w_m2_sr;
+  };
+  out.surroundings_w_m2_sr = static_cast<float>(black(now.environment_k));
+  // Take the clear sky and the sun's transmittance from the kind of air that the band has.
+  double sun_transmittance_frac = std::pow(entry.vertical_transmittance_frac, now.air_mass);
+  physics::SkyByTilt clear_w_m2_sr{};
+  if (entry.view) {
+    clear_w_m2_sr = entry.view->clear_sky_by_tilt_w_m2_sr(place_m_, sky_warmer_k(entry, now));
+    sun_transmittance_frac = entry.view->sun_transmittance_frac(place_m_, now.sin_shown);
+  } else if (entry.air) {
+    clear_w_m2_sr = entry.air_sky_w_m2_sr;
+    sun_transmittance_frac = entry.air->out(now.sin_sun).transmittance_frac;
+  } else {
+    const double sky_air_w_m2_sr = black(now.air_k + now.sky.warmer_k);
+    for (std::size_t t = 0; t < physics::kSkyTilts; ++t) {
+      clear_w_m2_sr[t] = sky_air_w_m2_sr * entry.sky_frac[t];
+    }
+  }
+  // Clouds cover the same share in all directions.
+  const double cover_frac = entry.has_sky ? now.sky.cloud_cover_frac : 0.0;
+  const double clouds_w_m2_sr = cover_frac > 0.0 ? cover_frac * black(now.sky.cloud_k) : 0.0;
+  for (std::size_t t = 0; t < physics::kSkyTilts; ++t) {
+    out.sky_w_m2_sr[t] = static_cast<float>((1.0 - cover_frac) * clear_w_m2_sr[t] + clouds_w_m2_sr);
+  }
+  out.sun_w_m2 = static_cast<float>(entry.sun_outside_w_m2 / (now.distance_au * now.distance_au) *
+                                    now.beam_frac * sun_transmittance_frac);
+}
+
+void BandModel::light_at(const physics::Forcing& forcing, const physics::SunPosition& sun,
+                         std::span<BandLight> out) const noexcept {
+  const Instant now = instant_of(forcing, sun);
+  for (std::size_t i = 0; i < entries_.size(); ++i) light_of(entries_[i], now, out[i]);
+}
+
 void BandModel::update(const physics::Forcing& forcing, const physics::SunPosition& sun,
                        double sensor_m) noexcept {
-  // The direct sun is weaker than a clear one by what clouds and haze take from the beam.
-  const double air_mass = physics::relative_air_mass(sun.elevation);
-  const double beam_frac = air_mass > 0.0
-                               ? (1.0 - forcing.cloud_frac) *
-                                     physics::beam_share_frac(forcing.direct_normal_w_m2, sun,
-                                                              physics::Metres(place_m_), turbidity_)
-                               : 0.0;
-  const physics::SkyState sky_now = physics::sky_state(
-      forcing.longwave_down_w_m2, forcing.air_k, dew_point_k_, forcing.cloud_frac, cloud_base_);
-  const double sin_sun = std::sin(sun.elevation.value());
-  const double sin_shown = std::sin(physics::apparent_elevation(sun.elevation).value());
+  const Instant now = instant_of(forcing, sun);
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     const Entry& entry = entries_[i];
     gpu::BandParams& params = params_[i];
-    // Compute the radiance of air, surroundings and sky.
-    const double air_w_m2_sr =
-        physics::band_radiance(entry.band, physics::Kelvin(forcing.air_k)).radiance_w_m2_sr;
-    params.air_radiance_w_m2_sr = static_cast<float>(air_w_m2_sr);
-    params.surroundings_radiance_w_m2_sr = static_cast<float>(
-        physics::band_radiance(entry.band, physics::Kelvin(forcing.environment_k))
-            .radiance_w_m2_sr);
-    const double cover_frac = entry.has_sky ? sky_now.cloud_cover_frac : 0.0;
-    const double cloud_w_m2_sr =
-        physics::band_radiance(entry.band, physics::Kelvin(sky_now.cloud_k)).radiance_w_m2_sr;
-    const double sky_air_w_m2_sr =
-        physics::band_radiance(entry.band, physics::Kelvin(forcing.air_k + sky_now.warmer_k))
-            .radiance_w_m2_sr;
-    params.sky_air_radiance_w_m2_sr = static_cast<float>((1.0 - cover_frac) * sky_air_w_m2_sr);
+    BandLight light;
+    light_of(entry, now, light);
+    params.surroundings_radiance_w_m2_sr = light.surroundings_w_m2_sr;
+    params.sun_irradiance_w_m2 = light.sun_w_m2;
+    for (std::size_t t = 0; t < physics::kSkyTilts; ++t) {
+      params.sky_by_tilt_w_m2_sr[t / 4][static_cast<glm::length_t>(t % 4)] = light.sky_w_m2_sr[t];
+    }
+    // Set what the camera sees of air and sky.
+    const auto black = [&](double kelvin) {
+      return physics::band_radiance(entry.band, physics::Kelvin(kelvin)).radiance_w_m2_sr;
+    };
+    const double cover_frac = entry.has_sky ? now.sky.cloud_cover_frac : 0.0;
+    const double cloud_w_m2_sr = black(now.sky.cloud_k);
+    params.air_radiance_w_m2_sr = static_cast<float>(black(now.air_k));
+    params.sky_air_radiance_w_m2_sr =
+        static_cast<float>((1.0 - cover_frac) * black(now.air_k + now.sky.warmer_k));
     params.cloud_radiance_w_m2_sr = static_cast<float>(cover_frac * cloud_w_m2_sr);
     params.clear_sky_frac = static_cast<float>(1.0 - cover_frac);
-    double clear_w_m2_sr = sky_air_w_m2_sr * entry.sky_hemisphere_frac;
-    double sun_transmittance_frac = std::pow(entry.vertical_transmittance_frac, air_mass);
-    if (entry.view) {
-      // The place's air differs from that of the climate, and the difference fades upwards.
-      const double warmer_k =
-          (forcing.air_k - entry.climate_k) * std::exp(place_m_ / physics::BandAir::kWarmthScaleM);
-      const physics::AirView::Weather weather{
-          .warmer_k = warmer_k,
-          .sky_warmer_k =
-              warmer_k + sky_now.warmer_k * std::exp(place_m_ / physics::BandAir::kWarmthScaleM),
-          .cloud_cover_frac = sky_now.cloud_cover_frac,
-          .cloud_base_m = place_m_ + sky_now.cloud_base_m,
-          .cloud_radiance_w_m2_sr = cloud_w_m2_sr};
-      entry.view->at(
-          sensor_m, weather,
-          std::span(air_nodes_).subspan(params.air_view_first, physics::AirView::kNodes));
-      clear_w_m2_sr = entry.view->clear_sky_mean_w_m2_sr(place_m_, weather.sky_warmer_k);
-      sun_transmittance_frac = entry.view->sun_transmittance_frac(place_m_, sin_shown);
-    } else if (entry.air) {
-      clear_w_m2_sr = entry.air_hemisphere_w_m2_sr;
-      sun_transmittance_frac = entry.air->out(sin_sun).transmittance_frac;
-    }
-    params.sky_hemisphere_w_m2_sr =
-        static_cast<float>((1.0 - cover_frac) * clear_w_m2_sr + cover_frac * cloud_w_m2_sr);
-    params.sun_irradiance_w_m2 =
-        static_cast<float>(entry.sun_outside_w_m2 / (sun.distance_au * sun.distance_au) *
-                           beam_frac * sun_transmittance_frac);
+    if (!entry.view) continue;
+    entry.view->at(sensor_m,
+                   {.warmer_k = warmer_k(entry, now),
+                    .sky_warmer_k = sky_warmer_k(entry, now),
+                    .cloud_cover_frac = now.sky.cloud_cover_frac,
+                    .cloud_base_m = place_m_ + now.sky.cloud_base_m,
+                    .cloud_radiance_w_m2_sr = cloud_w_m2_sr},
+                   std::span(air_nodes_).subspan(params.air_view_first, physics::AirView::kNodes));
   }
 }
 

@@ -7,18 +7,21 @@
 #include "emit/physics/air_view.hpp"
 #include "emit/physics/apparent_temperature.hpp"
 #include "emit/physics/atmosphere_table.hpp"
+#include "emit/physics/band_radiance_lut.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/physics/planck.hpp"
+#include "emit/physics/sky_state.hpp"
 #include "emit/physics/weather.hpp"
 #include "emit/scene/scene_desc.hpp"
 #include "shared/frame_params.glsl.h"
+#include "surface/heat/band_lights.hpp"
 
 namespace emit::renderer {
 
 /// Blackbody tables and atmosphere of the scenario's bands (physics.md sections 5 and 9).
 /// Owner: Renderer. Thread: the one of the renderer. Real time: build() and apparent_temperatures()
 /// are setup only, the rest is RT-safe.
-class BandModel {
+class BandModel final : public BandLights {
  public:
   /// Builds the tables of all bands and materials. Errors: config (no band or more than
   /// EMIT_MAX_BANDS, a band or an atmosphere that is not valid, tables too large for a device).
@@ -29,6 +32,17 @@ class BandModel {
   /// camera above sea level.
   void update(const physics::Forcing& forcing, const physics::SunPosition& sun,
               double sensor_m) noexcept;
+
+  [[nodiscard]] std::size_t bands() const noexcept override { return entries_.size(); }
+  void light_at(const physics::Forcing& forcing, const physics::SunPosition& sun,
+                std::span<BandLight> out) const noexcept override;
+  [[nodiscard]] float black_w_m2_sr(std::size_t band, float temperature_k) const noexcept override {
+    return entries_[band].lut.lookup(temperature_k).radiance_w_m2_sr;
+  }
+  [[nodiscard]] float emissivity_frac(std::uint32_t material,
+                                      std::size_t band) const noexcept override {
+    return tables_[first_emissivity_ + material * entries_.size() + band];
+  }
 
   /// Parameters by band, as the shaders read them.
   [[nodiscard]] std::span<const gpu::BandParams> params() const noexcept { return params_; }
@@ -59,11 +73,12 @@ class BandModel {
   /// Constants of one band.
   struct Entry {
     physics::Band band;
-    /// Mean radiance of the sky over the hemisphere divided by a blackbody at air temperature.
-    double sky_hemisphere_frac = 0.0;
+    physics::BandRadianceLut lut;
+    /// Radiance of the sky by tilt divided by a blackbody at air temperature.
+    physics::SkyByTilt sky_frac{};
     double vertical_transmittance_frac = 1.0;
     std::optional<physics::AtmosphereTable> air = std::nullopt;  ///< replaces the terms
-    double air_hemisphere_w_m2_sr = 0.0;                         ///< mean radiance of that sky
+    physics::SkyByTilt air_sky_w_m2_sr{};                        ///< of that table
     std::optional<physics::AirView> view = std::nullopt;         ///< built-in air
     double climate_k = 0.0;       ///< air temperature of the climate at the ground of the place
     double sun_outside_w_m2 = 0;  ///< in band, normal to the sun, at 1 au
@@ -71,6 +86,23 @@ class BandModel {
   };
   /// Makes the views of the bands with built-in air.
   [[nodiscard]] physics::Result<void> build_views(const scene::ScenarioDesc& scenario);
+  /// Weather of an instant in the terms of the picture.
+  struct Instant {
+    physics::SkyState sky;
+    double air_k = 0.0;
+    double environment_k = 0.0;
+    double air_mass = 0.0;
+    double beam_frac = 0.0;  ///< direct sun over that of a clear sky
+    double sin_sun = 0.0;
+    double sin_shown = 0.0;  ///< of the apparent elevation
+    double distance_au = 1.0;
+  };
+  [[nodiscard]] Instant instant_of(const physics::Forcing& forcing,
+                                   const physics::SunPosition& sun) const noexcept;
+  /// Air of the place against that of the climate at sea level; 0 without built-in air.
+  [[nodiscard]] double warmer_k(const Entry& entry, const Instant& now) const noexcept;
+  [[nodiscard]] double sky_warmer_k(const Entry& entry, const Instant& now) const noexcept;
+  void light_of(const Entry& entry, const Instant& now, BandLight& out) const noexcept;
   std::vector<Entry> entries_;
   std::vector<gpu::BandParams> params_;
   std::vector<float> tables_;

@@ -120,7 +120,8 @@ std::vector<CachedStage::Eye> CachedStage::eyes_around(std::span<const RefineVie
 
 physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
     const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
-    std::vector<FosterMaterial> foster_materials, const SceneHistory& history, bool software) {
+    std::vector<FosterMaterial> foster_materials, const SceneHistory& history,
+    const BandLights& lights, bool software) {
   // Collect the positions that the scenario's camera takes.
   const std::vector<RefineView::Eye> eyes = all_eyes(scenario.sensor.trajectory);
   std::vector<glm::dvec3> eyes_world_m;
@@ -153,14 +154,16 @@ physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
   }
   return std::unique_ptr<ThermalStage>(new CachedStage(
       scenario, bounds, eyes_around(eyes, bounds), std::move(*surface), std::move(foster_materials),
-      history, std::move(saved), coarse->visibly, std::move(shade_pass), software));
+      history, sees_in_band(scenario.thermal) ? &lights : nullptr, std::move(saved),
+      coarse->visibly, std::move(shade_pass), software));
 }
 
 CachedStage::CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb& static_bounds,
                          std::vector<Eye> detail_eyes, std::unique_ptr<CachedSurface> surface,
                          std::vector<FosterMaterial> foster_materials, const SceneHistory& history,
-                         std::optional<SavedSurface> saved, bool visibly_simplified,
-                         std::optional<ShadePass> shade_pass, bool software)
+                         const BandLights* lights, std::optional<SavedSurface> saved,
+                         bool visibly_simplified, std::optional<ShadePass> shade_pass,
+                         bool software)
     : sensor_(scenario.sensor),
       max_samples_(scenario.thermal.max_samples),
       software_(software),
@@ -169,6 +172,7 @@ CachedStage::CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb&
       visibly_simplified_(visibly_simplified),
       history_of_object_(histories_of_objects(scenario)),
       history_(history),
+      lights_(lights),
       plan_(scenario.thermal),
       surface_history_(scenario.thermal.steps,
                        make_foster(scenario, std::move(foster_materials), history.environment,
@@ -180,7 +184,8 @@ CachedStage::CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb&
 physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
                                            const WarmUpProgress& progress) {
   // Sample the surface for the camera and integrate its history, or read the state file.
-  const CachedSurface::Inputs inputs{history_.environment, history_.entities, history_.parts};
+  const CachedSurface::Inputs inputs{history_.environment, history_.entities, history_.parts,
+                                     lights_};
   RefineView view = refine_view(sensor_, request);
   for (const std::int64_t at_ns : planned_ns_) {
     const physics::SunPosition sun = history_.environment.sun_at(at_ns);
@@ -208,6 +213,12 @@ physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
   for (gl::Buffer& node : node_buffers_) {
     node = gl::Buffer::dynamic(surface_->model().drawn_samples * sizeof(SampleVertex));
   }
+  if (lights_ != nullptr) {
+    for (gl::Buffer& node : seen_buffers_) {
+      node =
+          gl::Buffer::dynamic(surface_->model().drawn_samples * lights_->bands() * sizeof(float));
+    }
+  }
   if (shade_pass_) {
     shade_pass_->begin(surface_->exposure_tiles());
     shade_buffer_ = gl::Buffer::dynamic(surface_->exposure_tiles().vertices_k().size_bytes());
@@ -223,7 +234,7 @@ physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
 physics::Result<void> CachedStage::carry_on(const FrameRequest& to,
                                             const WarmUpProgress& progress) {
   return surface_->carry_on(to.thermal_time_ns,
-                            {history_.environment, history_.entities, history_.parts},
+                            {history_.environment, history_.entities, history_.parts, lights_},
                             surface_history_, progress);
 }
 
@@ -308,7 +319,8 @@ SampleReading CachedStage::sample_reading(std::uint32_t sample) const noexcept {
 
 void CachedStage::prepare(const FrameRequest& request, CameraSetup& camera,
                           gpu::FrameParams& frame) noexcept {
-  const CachedSurface::Inputs inputs{history_.environment, history_.entities, history_.parts};
+  const CachedSurface::Inputs inputs{history_.environment, history_.entities, history_.parts,
+                                     lights_};
   // Advance the samples to the thermal instant.
   surface_->advance(request.thermal_time_ns, inputs, surface_history_);
   // Place the shadows of entities at their poses of the frame.
@@ -333,6 +345,13 @@ void CachedStage::upload() noexcept {
       node_buffers_[storage].upload(surface_->vertices(node).subspan(range.first, range.count),
                                     range.first);
     }
+    if (lights_ == nullptr) continue;
+    const std::size_t bands = lights_->bands();
+    for (const ChangedRanges::Range& range : surface_->seen_changes(storage)) {
+      seen_buffers_[storage].upload(
+          surface_->seen_w_m2_sr(node).subspan(range.first * bands, range.count * bands),
+          range.first * bands);
+    }
   }
   // Send the shade of entities that changed.
   if (shade_pass_) {
@@ -354,6 +373,11 @@ void CachedStage::draw(const glm::uvec2&, StageTimes& stages, StageClock& clock)
 void CachedStage::bind() const noexcept {
   drawn_->vertices.read_nodes(node_buffers_[surface_->storage(0)],
                               node_buffers_[surface_->storage(1)]);
+  if (lights_ != nullptr) {
+    drawn_->vertices.read_seen(seen_buffers_[surface_->storage(0)],
+                               seen_buffers_[surface_->storage(1)],
+                               static_cast<std::uint32_t>(lights_->bands()));
+  }
   if (shade_pass_) drawn_->vertices.read_shade(shade_buffer_);
 }
 

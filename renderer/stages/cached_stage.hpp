@@ -17,11 +17,18 @@ namespace emit::renderer {
 /// (renderer/surface) and are drawn with the refined meshes that have the samples as vertices.
 class CachedStage final : public ThermalStage {
  public:
-  /// Simplifies the meshes, creates the surface and compiles the passes. `software` says that the
-  /// device is a CPU. Errors: those of CachedSurface::create(), gpu (names the shader).
+  /// Simplifies the meshes, creates the surface and compiles the passes. `lights` outlives the
+  /// stage. `software` says that the device is a CPU. Errors: those of CachedSurface::create(), gpu
+  /// (names the shader).
   [[nodiscard]] static physics::Result<std::unique_ptr<ThermalStage>> create(
       const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
-      std::vector<FosterMaterial> foster_materials, const SceneHistory& history, bool software);
+      std::vector<FosterMaterial> foster_materials, const SceneHistory& history,
+      const BandLights& lights, bool software);
+  /// True if vertices have what other samples send them in band (SceneVertexArrays::read_seen).
+  [[nodiscard]] static bool sees_in_band(const scene::ThermalOptions& options) noexcept {
+    return options.method == scene::ThermalMethod::cached &&
+           options.model == scene::ThermalModel::foster && options.exchange;
+  }
 
   void plan(std::span<const std::int64_t> thermal_times_ns) override {
     planned_ns_.assign(thermal_times_ns.begin(), thermal_times_ns.end());
@@ -65,7 +72,7 @@ class CachedStage final : public ThermalStage {
   CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb& static_bounds,
               std::vector<Eye> detail_eyes, std::unique_ptr<CachedSurface> surface,
               std::vector<FosterMaterial> foster_materials, const SceneHistory& history,
-              std::optional<SavedSurface> saved, bool visibly_simplified,
+              const BandLights* lights, std::optional<SavedSurface> saved, bool visibly_simplified,
               std::optional<ShadePass> shade_pass, bool software);
 
   scene::SensorDesc sensor_;
@@ -77,6 +84,7 @@ class CachedStage final : public ThermalStage {
   std::vector<Eye> refined_eyes_;  ///< triangles were refined for these
   std::vector<std::int32_t> history_of_object_;
   const SceneHistory& history_;
+  const BandLights* lights_;  ///< null without sees_in_band()
   StepPlan plan_;
   SurfaceHistory surface_history_;
   std::unique_ptr<CachedSurface> surface_;
@@ -88,6 +96,7 @@ class CachedStage final : public ThermalStage {
   std::int64_t drawn_ns_ = 0;  ///< simulation time of the latest frame, of its entities
 
   std::array<gl::Buffer, 3> node_buffers_;  ///< one per storage of CachedSurface
+  std::array<gl::Buffer, 3> seen_buffers_;  ///< the same; empty without sees_in_band()
   std::optional<ShadePass> shade_pass_;     ///< empty when the scenario has no entities
   gl::Buffer shade_buffer_;                 ///< recent shade of entities by vertex, K
 };

@@ -64,15 +64,16 @@ ViewCell elevation_cell(float sin_elevation) noexcept {
   return view_cell(((x < 0.0F ? -root : root) - kFirst) * kPerNode, AirView::kElevations);
 }
 
-/// Shares of the sky's nodes in a cosine-weighted mean over the upper hemisphere, by the midpoint
-/// rule in the square of the sine.
-std::array<float, AirView::kElevations> sky_shares() {
-  constexpr int kRings = 4096;
-  std::array<float, AirView::kElevations> shares{};
-  for (int i = 0; i < kRings; ++i) {
-    const ViewCell cell = elevation_cell(static_cast<float>(std::sqrt((i + 0.5) / kRings)));
-    shares[cell.index] += (1.0F - cell.fraction) / kRings;
-    shares[cell.index + 1] += cell.fraction / kRings;
+/// Shares of the sky's nodes in the means of sky_by_tilt().
+using SkyShares = std::array<SkyByTilt, AirView::kElevations>;
+SkyShares sky_shares() {
+  SkyShares shares{};
+  for (std::size_t e = 0; e < AirView::kElevations; ++e) {
+    shares[e] = sky_by_tilt([e](double sine) {
+      const ViewCell cell = elevation_cell(static_cast<float>(sine));
+      if (e == cell.index) return 1.0 - static_cast<double>(cell.fraction);
+      return e == cell.index + 1 ? static_cast<double>(cell.fraction) : 0.0;
+    });
   }
   return shares;
 }
@@ -172,12 +173,15 @@ void AirView::at(double sensor_m, const Weather& weather, std::span<Node> out) c
   for (std::size_t i = kSky; i < kNodes; ++i) out[i][3] += cover * (cloud - out[i][3]);
 }
 
-double AirView::clear_sky_mean_w_m2_sr(double height_m, double warmer_k) const noexcept {
-  static const std::array<float, kElevations> kShare = sky_shares();
+SkyByTilt AirView::clear_sky_by_tilt_w_m2_sr(double height_m, double warmer_k) const noexcept {
+  static const SkyShares kShares = sky_shares();
   const Place place = place_of(height_m, warmer_k);
-  double sum = 0.0;
+  SkyByTilt sum{};
   for (std::size_t e = 0; e < kElevations; ++e) {
-    if (kShare[e] > 0.0F) sum += kShare[e] * radiance_at(place, kHeights * kRanges + e);
+    const SkyByTilt& share = kShares[e];
+    if (share[kSkyTilts - 1] == 0.0 && share[0] == 0.0) continue;
+    const double radiance = radiance_at(place, kHeights * kRanges + e);
+    for (std::size_t t = 0; t < kSkyTilts; ++t) sum[t] += share[t] * radiance;
   }
   return sum;
 }

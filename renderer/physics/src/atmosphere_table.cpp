@@ -146,17 +146,6 @@ AtmosphereTable::Air AtmosphereTable::out(double sin_elevation) const noexcept {
   return along(range_m_.back(), sin_elevation);
 }
 
-double AtmosphereTable::sky_hemisphere_w_m2_sr() const {
-  // Midpoint rule in sin^2 of the elevation, which is the measure of the cosine-weighted
-  // hemisphere.
-  constexpr int kRings = 1024;
-  double sum = 0.0;
-  for (int i = 0; i < kRings; ++i) {
-    sum += out(std::sqrt((i + 0.5) / kRings)).path_radiance_w_m2_sr;
-  }
-  return sum / kRings;
-}
-
 std::vector<float> AtmosphereTable::shader_nodes() const {
   std::vector<float> out;
   out.reserve(range_m_.size() + sin_elevation_.size() + 2 * nodes_.size());

@@ -47,4 +47,14 @@ SkyState sky_state(double longwave_down_w_m2, double air_k, double dew_point_k, 
   return state;
 }
 
+double tilted_cosine(double normal_up, double sin_elevation) noexcept {
+  const double up = normal_up * sin_elevation;
+  const double across = std::sqrt(std::max(0.0, 1.0 - normal_up * normal_up)) *
+                        std::sqrt(std::max(0.0, 1.0 - sin_elevation * sin_elevation));
+  if (up >= across) return up;
+  if (up <= -across) return 0.0;
+  // The cosine is up + across cos(azimuth), above 0 for azimuths below acos(-up / across).
+  return (up * std::acos(-up / across) + std::sqrt(across * across - up * up)) / kPi;
+}
+
 }  // namespace emit::physics

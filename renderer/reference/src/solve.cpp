@@ -389,6 +389,7 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
     band.set_air(now.air_k, sun, beam_frac, sky_now);
     // Compute the radiance that every patch sends out.
     const double around = band.black(now.surroundings_k);
+    const double level_sky = band.sky_mean(1.0);  // patches hold faces of several tilts
     std::vector<double> patch;
     if (solid) {
       // The radiance is the patch's emission, and the surroundings mirrored once.
@@ -397,7 +398,7 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
         const double e = band.emissivity(geometry.materials[solid->radiation().material_of(f)]);
         const double sky = solid->radiation().exchange().sky_frac(f);
         leaving[f] =
-            e * band.black(face_k[f]) + (1.0 - e) * (sky * band.sky_mean() + (1.0 - sky) * around);
+            e * band.black(face_k[f]) + (1.0 - e) * (sky * level_sky + (1.0 - sky) * around);
       });
       patch = solid->radiation().exchange().patch_means(leaving);
     } else {
@@ -405,8 +406,7 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
         const double e = band.emissivity(geometry.materials[points.patch_material[p]]);
         const PatchState& state = points.patches[p];
         patch.push_back(e * band.black(state.temperature_k) +
-                        (1.0 - e) *
-                            (state.sky_frac * band.sky_mean() + (1.0 - state.sky_frac) * around));
+                        (1.0 - e) * (state.sky_frac * level_sky + (1.0 - state.sky_frac) * around));
       }
     }
     std::vector<float>& plane = image.radiance_w_m2_sr[b];
@@ -414,7 +414,7 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
       const PixelHit& hit = hits[i];
       const double e = band.emissivity(geometry.materials[hit.point.material]);
       // Sum what arrives at the surface: sky, surroundings, sun and patches.
-      double incoming = hit.sky_frac * band.sky_mean() + hit.ground_frac * around;
+      double incoming = hit.sky_frac * band.sky_mean(hit.point.normal.z) + hit.ground_frac * around;
       const double sunlight = band.sun_w_m2() / physics::kPi * hit.sun_frac *
                               std::max(0.0, glm::dot(hit.point.normal, to_sun));
       if (solid) {

@@ -166,15 +166,35 @@ void BandRadiance::set_air(double air_k, const physics::SunPosition& sun, double
     through = table_ ? table_->out(sin_sun).transmittance_frac
                      : std::pow(vertical_frac_, air_mass(sin_sun));
   }
-  // Average the sky by the midpoint rule over the elevation, weight 2 sin cos.
-  const int rings = column_ ? 400 : 2000;
-  sky_mean_ = 0.0;
+  // Average the sky before faces of every tilt over elevation and azimuth, by the midpoint rule.
+  const int rings = column_ ? 400 : 1000;
+  constexpr int kSectors = 90;  // of half a turn
+  std::array<double, kTiltSteps + 1> weights{};
+  sky_means_.fill(0.0);
   for (int i = 0; i < rings; ++i) {
     const double elevation = (i + 0.5) / rings * physics::kPi / 2.0;
-    sky_mean_ +=
-        sky(0.0, std::sin(elevation)) * std::sin(2.0 * elevation) * physics::kPi / 2.0 / rings;
+    const double radiance = sky(0.0, std::sin(elevation));
+    for (std::size_t t = 0; t <= kTiltSteps; ++t) {
+      const double tilt = std::min(static_cast<double>(t) / kTiltSteps, 0.999) * physics::kPi;
+      double cosines = 0.0;
+      for (int k = 0; k < kSectors; ++k) {
+        cosines += std::max(0.0, std::cos(tilt) * std::sin(elevation) +
+                                     std::sin(tilt) * std::cos(elevation) *
+                                         std::cos((k + 0.5) / kSectors * physics::kPi));
+      }
+      const double weight = cosines * std::cos(elevation);
+      sky_means_[t] += weight * radiance;
+      weights[t] += weight;
+    }
   }
+  for (std::size_t t = 0; t <= kTiltSteps; ++t) sky_means_[t] /= weights[t];
   sun_w_m2_ = sun_outside_w_m2_ / (sun.distance_au * sun.distance_au) * beam_frac * through;
+}
+
+double BandRadiance::sky_mean(double normal_up) const noexcept {
+  const double place = std::acos(std::clamp(normal_up, -1.0, 1.0)) / physics::kPi * kTiltSteps;
+  const auto node = std::min(static_cast<std::size_t>(place), kTiltSteps - 1);
+  return std::lerp(sky_means_[node], sky_means_[node + 1], place - static_cast<double>(node));
 }
 
 double BandRadiance::emissivity(const scene::Material& material) const {

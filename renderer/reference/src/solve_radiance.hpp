@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <array>
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -52,8 +54,9 @@ class BandRadiance {
   [[nodiscard]] double black(double kelvin) const { return integral_.radiance_w_m2_sr(kelvin); }
   /// Returns the emissivity of a material in this band.
   [[nodiscard]] double emissivity(const scene::Material& material) const;
-  /// Cosine-weighted mean of the sky's radiance, W m-2 sr-1.
-  [[nodiscard]] double sky_mean() const noexcept { return sky_mean_; }
+  /// Returns the mean of the sky's radiance over the part before a face, weighted with the cosine
+  /// to its normal, W m-2 sr-1. `normal_up` is the vertical component of the unit normal.
+  [[nodiscard]] double sky_mean(double normal_up) const noexcept;
   /// Irradiance of the sun in the band, across its direction, W m-2.
   [[nodiscard]] double sun_w_m2() const noexcept { return sun_w_m2_; }
   /// Radiance that leaves a surface, W m-2 sr-1.
@@ -87,7 +90,8 @@ class BandRadiance {
   double cloud_ = 0.0;    ///< radiance of the clouds, W m-2 sr-1
   double sky_air_ = 0.0;  ///< blackbody as warm as the air of the sky
   double air_ = 0.0;
-  double sky_mean_ = 0.0;
+  static constexpr std::size_t kTiltSteps = 90;
+  std::array<double, kTiltSteps + 1> sky_means_{};  ///< by tilt, every 2 degrees
   double sun_w_m2_ = 0.0;
   double sun_outside_w_m2_ = 0.0;  ///< at 1 au
 };

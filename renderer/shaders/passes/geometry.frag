@@ -8,9 +8,11 @@ layout(std140, binding = EMIT_BIND_DRAW) uniform Draw { DrawParams draw; };
 
 #ifdef EMIT_CACHED
 in vec4 sample_state;
+in EMIT_BANDS_VEC incoming_w_m2_sr;
 layout(location = 0) out uvec2 surface;
+layout(location = 1) out EMIT_BANDS_VEC incoming;
 #ifdef EMIT_OBJECTS
-layout(location = 1) out uint object;
+layout(location = 2) out uint object;
 #endif
 
 void main() {
@@ -18,6 +20,7 @@ void main() {
   float cosine = gl_FrontFacing ? sample_state.w : -sample_state.w;
   surface = packed_surface_texel(sample_state.x, sample_state.y * max(cosine, 0.0), sample_state.z, draw.material,
                                  draw.moves != 0u);
+  incoming = incoming_w_m2_sr;
 #ifdef EMIT_OBJECTS
   object = draw.object;
 #endif

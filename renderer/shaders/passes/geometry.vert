@@ -11,6 +11,17 @@ layout(std140, binding = EMIT_BIND_FRAME) uniform Frame { FrameParams frame; };
 layout(std140, binding = EMIT_BIND_DRAW) uniform Draw { DrawParams draw; };
 
 #ifdef EMIT_CACHED
+layout(std140, binding = EMIT_BIND_BANDS) uniform Bands { BandParams bands[EMIT_MAX_BANDS]; };
+#define EMIT_SKY_TILT(band, node) bands[band].sky_by_tilt_w_m2_sr[(node) >> 2][(node) & 3]
+#include "lib/sky_tilt.glsl"
+#ifdef EMIT_SEEN
+// Radiance that other samples send at the two nodes, by band, above that of the surroundings and times their share of
+// the hemisphere.
+layout(location = EMIT_ATTR_SEEN_BEFORE) in vec4 seen_before;
+layout(location = EMIT_ATTR_SEEN_AFTER) in vec4 seen_after;
+#endif
+// Mean radiance that arrives from everything but the sun, by band, W m-2 sr-1.
+out EMIT_BANDS_VEC incoming_w_m2_sr;
 // State of the sample at the node of time before the frame and at the node after it: temperature offset in K, visible
 // share of the sun.
 layout(location = EMIT_ATTR_NODE_BEFORE) in vec2 node_before;
@@ -35,7 +46,8 @@ void main() {
            draw.normal_from_mesh[2].xyz * normal_mesh.z;
 #ifdef EMIT_CACHED
   // Interpolate the state of the sample between the two nodes of time.
-  float cosine = dot(n, frame.to_sun) * inversesqrt(max(dot(n, n), 1e-30)) * frame.sun_up;
+  float per_length = inversesqrt(max(dot(n, n), 1e-30));
+  float cosine = dot(n, frame.to_sun) * per_length * frame.sun_up;
   vec2 now = mix(node_before, node_after, frame.node_frac);
 #ifdef EMIT_SHADE
   now.x += shade_k * now.y * max(cosine, 0.0);
@@ -47,6 +59,17 @@ void main() {
   float sky_frac = normal_mesh.w;
 #endif
   sample_state = vec4(frame.reference_k + now.x, now.y, sky_frac, cosine);
+  // Add up what arrives: the open part of the hemisphere shows sky, the rest surroundings and other samples.
+#ifdef EMIT_SEEN
+  vec4 incoming = mix(seen_before, seen_after, frame.node_frac);
+#else
+  vec4 incoming = vec4(0.0);
+#endif
+  vec2 tilt = sky_tilt_place(n.z * per_length);
+  for (uint i = 0u; i < EMIT_BANDS; ++i) {
+    incoming[i] += mix(bands[i].surroundings_radiance_w_m2_sr, sky_at_tilt_w_m2_sr(i, tilt), sky_frac);
+  }
+  incoming_w_m2_sr = EMIT_BANDS_OF(incoming);
 #else
   normal_relworld = n;
 #endif

@@ -36,10 +36,14 @@ struct Seen {
   float sun_cosine;  // cosine of the sun's incidence times the visible share of the sun
   uint material;
   uint object;
+#ifndef EMIT_CACHED
+  float normal_up;   // vertical component of the unit normal
+#endif
 };
 
 #ifdef EMIT_CACHED
 layout(binding = EMIT_TEX_SURFACE) uniform usampler2D surface_texture;
+layout(binding = EMIT_TEX_INCOMING) uniform sampler2D incoming_texture;
 
 // Reads what a pixel shows of the sampled surface.
 Seen seen_at(ivec2 px) {
@@ -79,9 +83,26 @@ Seen seen_at(ivec2 px) {
   float open_frac = min(2.0 * texelFetch(occlusion_texture, px, 0).r, 1.0) * 0.5 * (1.0 + n.z);
   float sun_frac = frame.sun_up > 0.0 ? texelFetch(sun_now_texture, px, 0).r : 0.0;
   return Seen(gbuffer_depth_m(px), temperature_at(px, int(ids.x)), open_frac,
-              sun_frac * max(dot(n, frame.to_sun), 0.0), ids.x, ids.y);
+              sun_frac * max(dot(n, frame.to_sun), 0.0), ids.x, ids.y, n.z);
 }
+#define EMIT_SKY_TILT(band, node) band_uniforms[band].sky_by_tilt_w_m2_sr[(node) >> 2][(node) & 3]
+#include "lib/sky_tilt.glsl"
 #endif
+
+// Mean radiance that arrives at the surface of a pixel from everything but the sun, by band, W m-2 sr-1. The open part of
+// the hemisphere shows sky, the rest the surroundings; samples know more of what they see.
+vec4 incoming_w_m2_sr(ivec2 px, Seen seen) {
+#ifdef EMIT_CACHED
+  return texelFetch(incoming_texture, px, 0);
+#else
+  vec4 sum = vec4(0.0);
+  vec2 tilt = sky_tilt_place(seen.normal_up);
+  for (uint i = 0u; i < EMIT_BANDS; ++i) {
+    sum[i] = mix(bands[i].surroundings_radiance_w_m2_sr, sky_at_tilt_w_m2_sr(i, tilt), seen.open_frac);
+  }
+  return sum;
+#endif
+}
 
 // Relative air mass of Kasten and Young (1989), physics.md eq. 10: 1 at the zenith, 38 at the horizon.
 float air_mass(float sin_elevation) {
@@ -110,15 +131,14 @@ uvec4 air_table(uint band) {
   return uvec4(bands[band].air_table_first, bands[band].air_table_ranges, bands[band].air_table_elevations, 0u);
 }
 
-// Band radiance that leaves the surface, W m-2 sr-1: x = emission and what sky and surroundings send, y = reflected
+// Band radiance that leaves the surface, W m-2 sr-1: x = emission and reflection of `incoming`, y = reflected
 // sunlight. Sets `clamped` where the temperature lies outside the table.
-vec2 leaving_w_m2_sr(uint band, Seen seen, inout bool clamped) {
+vec2 leaving_w_m2_sr(uint band, Seen seen, float incoming, inout bool clamped) {
   vec4 lut = vec4(bands[band].lut_first_k, bands[band].lut_nodes_per_k, bands[band].lut_last_node,
                   float(band * frame.band_lut_nodes));
   float emissivity_frac = texelFetch(band_lut, int(frame.first_emissivity + seen.material * EMIT_BANDS + band)).r;
   float emitted = emissivity_frac * planck_lut_radiance_w_m2_sr(seen.temperature_k, lut, clamped);
-  // Add the diffuse reflection. The open part of the hemisphere shows sky, the rest the surroundings.
-  float incoming = mix(bands[band].surroundings_radiance_w_m2_sr, bands[band].sky_hemisphere_w_m2_sr, seen.open_frac);
+  // Add the diffuse reflection.
   float sunlight = bands[band].sun_irradiance_w_m2 / EMIT_PI * seen.sun_cosine;
   return vec2(emitted + (1.0 - emissivity_frac) * incoming, (1.0 - emissivity_frac) * sunlight);
 }
@@ -148,6 +168,7 @@ void write_pixel(ivec2 px) {
   uint plane_px = frame.rendered_plane_px;
   // Read what the pixel shows and the elevation of its line of sight.
   Seen seen = seen_at(px);
+  vec4 incoming = incoming_w_m2_sr(px, seen);
   vec3 ray = sensor_ray(px);
   float ray_length = length(ray);
   vec3 up = vec3(frame.relworld_from_sensor[0].z, frame.relworld_from_sensor[1].z, frame.relworld_from_sensor[2].z);
@@ -165,7 +186,7 @@ void write_pixel(ivec2 px) {
   // software rasterisers run both sides of a branch anyway.
   for (uint i = 0u; i < EMIT_BANDS; ++i) {
     bool off_table = false;
-    vec2 leaving = leaving_w_m2_sr(i, seen, off_table);
+    vec2 leaving = leaving_w_m2_sr(i, seen, incoming[i], off_table);
     clamped = clamped || (surface && off_table);
     float radiance_w_m2_sr = surface ? leaving.x + leaving.y : 0.0;
     if ((EMIT_AIR_MODEL >> i & 1u) != 0u) {

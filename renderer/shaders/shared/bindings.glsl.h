@@ -42,6 +42,7 @@
 #define EMIT_TEX_AIR 21
 #define EMIT_TEX_TARGET_PLANES 22
 #define EMIT_TEX_TARGET_ROWS 23
+#define EMIT_TEX_INCOMING 24
 
 // Image units.
 #define EMIT_IMG_OCCLUSION 0
@@ -57,9 +58,13 @@
 #define EMIT_ATTR_NODE_AFTER 6
 #define EMIT_ATTR_SHADE 7
 #define EMIT_ATTR_HULL 8
+#define EMIT_ATTR_SEEN_BEFORE 9
+#define EMIT_ATTR_SEEN_AFTER 10
 
 #define EMIT_MAX_CASCADES 4
 #define EMIT_MAX_BANDS 4
+#define EMIT_SKY_TILTS 17  // nodes of the sky by tilt, in EMIT_SKY_TILT_VEC4 vectors
+#define EMIT_SKY_TILT_VEC4 5
 #define EMIT_MAX_MODES 2
 #define EMIT_MAX_ATMOSPHERE_TERMS 4
 #define EMIT_MAX_TAPS 256

@@ -143,7 +143,7 @@ struct BandParams {
   vec4 terms_extinction_per_m;
   float air_radiance_w_m2_sr;           // blackbody at air temperature
   float surroundings_radiance_w_m2_sr;  // blackbody at the temperature of the surroundings
-  float sky_hemisphere_w_m2_sr;         // cosine-weighted mean over the sky
+  float unused0;
   float vertical_transmittance_frac;    // ground to space
   float sun_irradiance_w_m2;            // in band, normal to the sun, at the ground
   float lut_first_k;                    // temperature of the first node of the band's T ln L table
@@ -156,7 +156,8 @@ struct BandParams {
   float sky_air_radiance_w_m2_sr;       // blackbody as warm as the air of the sky, times the clear share
   float cloud_radiance_w_m2_sr;         // of the clouds, times their cover
   float clear_sky_frac;                 // share of the sky without clouds
-  uint unused0;
+  uint unused1;
+  vec4 sky_by_tilt_w_m2_sr[EMIT_SKY_TILT_VEC4];  // mean of the sky that a face sees, see lib/sky_tilt.glsl
 };
 
 // Counters of one frame. Shaders add to them with atomics.
@@ -200,11 +201,12 @@ EMIT_SHARED_OFFSET(StepParams, film_end, 80 * EMIT_MAX_CASCADES + 128);
 EMIT_SHARED_OFFSET(StepParams, air_start_offset_k, 80 * EMIT_MAX_CASCADES + 192);
 EMIT_SHARED_OFFSET(StepParams, cascade_count, 80 * EMIT_MAX_CASCADES + 208);
 static_assert(sizeof(RelaxationParams) == 32);
-static_assert(sizeof(BandParams) == 96);
+static_assert(sizeof(BandParams) == 96 + 16 * EMIT_SKY_TILT_VEC4);
 EMIT_SHARED_OFFSET(BandParams, air_radiance_w_m2_sr, 32);
 EMIT_SHARED_OFFSET(BandParams, sun_irradiance_w_m2, 48);
 EMIT_SHARED_OFFSET(BandParams, air_table_first, 64);
 EMIT_SHARED_OFFSET(BandParams, sky_air_radiance_w_m2_sr, 80);
+EMIT_SHARED_OFFSET(BandParams, sky_by_tilt_w_m2_sr, 96);
 static_assert(sizeof(FrameStatsGpu) == 16);
 #endif
 

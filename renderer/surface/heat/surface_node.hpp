@@ -72,6 +72,9 @@ struct SurfaceNode {
   std::vector<SampleOutput> outputs;
   std::vector<SampleVertex> vertices;  ///< values of the drawn samples, for the device
   ChangedRanges changes;               ///< ranges of `vertices` that have changed
+  /// What other samples send to a sample, by sample, then band (BandExchange). Empty without bands.
+  std::vector<float> seen_w_m2_sr;
+  ChangedRanges seen_changes;  ///< ranges of samples with vertices that have changed there
   std::int64_t at_ns = 0;
   /// Forcing of the interval that ends at this node, as it was assumed when the node was computed.
   IntervalForcing forcing;

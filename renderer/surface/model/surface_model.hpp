@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "emit/scene/mesh.hpp"
+#include "surface/heat/band_lights.hpp"
 #include "surface/heat/sample_heat.hpp"
 #include "surface/heat/surface_samples.hpp"
 #include "surface/mesh/drawn_mesh.hpp"
@@ -84,6 +85,7 @@ struct SurfaceInputs {
   /// Places in rel where each entity stands now and where its script takes it. An empty span:
   /// entities stay where they are.
   std::span<const std::vector<glm::vec3>> ways_m{};
+  const BandLights* lights = nullptr;  ///< null: reflections in band refine nothing
 };
 
 /// Returns the thermal diffusivity of the outermost layer. It is 0 for a prescribed material, and

@@ -156,8 +156,9 @@ physics::Result<void> CachedSurface::carry_on(std::int64_t now_ns, const Inputs&
 void CachedSurface::begin_first_interval(std::int64_t start_ns, const Inputs& inputs,
                                          const StepPlan& plan, SurfaceHistory& history) {
   // Move the states of the model into node 0.
+  const BandLights* const lights = model_options().exchange ? inputs.lights : nullptr;
   nodes_.begin(std::move(model_->states), std::move(model_->outputs), model_->drawn_samples,
-               model_->body_k);
+               model_->body_k, lights == nullptr ? 0 : lights->bands());
   SurfaceNode& first = nodes_[0];
   first.at_ns = start_ns;
   first.surroundings = history.surroundings();
@@ -175,7 +176,7 @@ void CachedSurface::begin_first_interval(std::int64_t start_ns, const Inputs& in
   }
   // Let all blocks follow the intervals.
   interval_.reset(*model_, anchors_, model_options().exchange,
-                  static_cast<std::uint32_t>(plan.intervals().size()));
+                  static_cast<std::uint32_t>(plan.intervals().size()), lights);
   local_ = LocalSteps(model_->samples,
                       LocalSteps::Setup{grid_.start_ns(), grid_.interval_ns(),
                                         inputs.entities.size(), inputs.parts},
@@ -189,6 +190,7 @@ void CachedSurface::begin_first_interval(std::int64_t start_ns, const Inputs& in
   }
   // Compute node 1.
   begin_anew(0, inputs, history);
+  interval_.settle_bands(model_->samples, inputs, nodes_[0], nodes_[1], workers_);
   interval_.finish(nodes_[0], nodes_[1], model_->samples, nullptr, workers_);
 }
 
@@ -273,7 +275,7 @@ void CachedSurface::end_interval(const Inputs& inputs, SurfaceHistory& history) 
   finish();
   nodes_.rotate();
   local_->rotated(window(), model_->samples);
-  nodes_[2].changes.clear();
+  SurfaceNodes::forget_changes(nodes_[2]);
   begin_next(nodes_[0].at_ns, inputs, history);
 }
 
@@ -308,7 +310,7 @@ void CachedSurface::end_renewal(std::int64_t now_ns, const Inputs& inputs,
   finish();
   renewing_ = false;
   lags_ = misses_weather(now_ns, inputs);
-  nodes_[2].changes.clear();
+  SurfaceNodes::forget_changes(nodes_[2]);
   begin_next(now_ns, inputs, history);
 }
 

@@ -98,6 +98,17 @@ class CachedSurface {
   [[nodiscard]] std::span<const ChangedRanges::Range> changes(std::size_t storage) const noexcept {
     return nodes_.stored(storage).changes.ranges();
   }
+  /// What other samples send to the vertices in band at a node, by vertex, then band. Empty where
+  /// faces do not exchange radiation, and without light in WorldInputs.
+  [[nodiscard]] std::span<const float> seen_w_m2_sr(std::size_t node) const noexcept {
+    return nodes_[node].seen_w_m2_sr;
+  }
+  /// Ranges of vertices in a storage whose values of seen_w_m2_sr() have changed since
+  /// forget_changes().
+  [[nodiscard]] std::span<const ChangedRanges::Range> seen_changes(
+      std::size_t storage) const noexcept {
+    return nodes_.stored(storage).seen_changes.ranges();
+  }
   /// Forgets the changes of all nodes and of exposure_tiles().
   void forget_changes() noexcept;
   /// Temperature of the surroundings in K; empty if the thermal model does not compute it.

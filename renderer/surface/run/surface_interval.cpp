@@ -17,6 +17,8 @@ namespace {
 /// and the share at which that is done at the latest.
 constexpr double kSamplesFrac = 0.5;
 constexpr double kColumnsFrac = 0.9;
+/// Share of the time in which temperatures are found, if samples see each other in band afterwards.
+constexpr double kHeatFrac = 0.85;
 
 /// Returns the part of `count` that is due.
 std::size_t due(double passed_frac, std::size_t count) noexcept {
@@ -46,12 +48,13 @@ SurfaceInterval::SurfaceInterval(const SurfaceGeometry& geometry, const SampleHe
 }
 
 void SurfaceInterval::reset(const SurfaceModel& model, std::vector<EntityAnchor> anchors,
-                            bool exchange, std::uint32_t turn) {
+                            bool exchange, std::uint32_t turn, const BandLights* lights) {
   turn_ = turn;
   rays_.anchor(std::move(anchors));
   count_ = static_cast<std::uint32_t>(model.samples.samples.size());
   done_ = 0;
   columns_.emplace(model.samples, heat_);
+  bands_.emplace(model.samples, lights);
   exitance_ = {};
   views_ = {};
   faces_.clear();
@@ -92,11 +95,24 @@ void SurfaceInterval::begin(const SurfaceNode& from, SurfaceNode& to, const Surf
   }
   done_ = 0;
   columns_->begin(forcing.dt_s);
+  bands_->begin(to, inputs);
 }
 
 void SurfaceInterval::compute(const SurfaceNode& from, SurfaceNode& to, double passed_frac,
                               const SurfaceSamples& all, const LocalSteps* skipped,
                               threads::WorkerPool& workers) noexcept {
+  const std::size_t units = bands_->units();
+  if (!warm()) {
+    compute_heat(from, to, passed_frac / (units == 0 ? 1.0 : kHeatFrac), all, skipped, workers);
+    return;
+  }
+  const std::size_t until = due((passed_frac - kHeatFrac) / (1.0 - kHeatFrac), units);
+  if (until > bands_->worked()) bands_->work(until, all, rays_, from, to, workers);
+}
+
+void SurfaceInterval::compute_heat(const SurfaceNode& from, SurfaceNode& to, double passed_frac,
+                                   const SurfaceSamples& all, const LocalSteps* skipped,
+                                   threads::WorkerPool& workers) noexcept {
   const bool alone = columns_->columns() == 0;
   advance_samples(
       from, to, static_cast<std::uint32_t>(due(passed_frac / (alone ? 1.0 : kSamplesFrac), count_)),
@@ -116,8 +132,9 @@ void SurfaceInterval::compute(const SurfaceNode& from, SurfaceNode& to, double p
 
 void SurfaceInterval::finish(const SurfaceNode& from, SurfaceNode& to, const SurfaceSamples& all,
                              const LocalSteps* skipped, threads::WorkerPool& workers) noexcept {
-  compute(from, to, 1.0, all, skipped, workers);
-  if (!finished()) columns_->work(std::numeric_limits<std::size_t>::max(), to, workers);
+  if (!warm()) compute_heat(from, to, 1.0, all, skipped, workers);
+  if (!warm()) columns_->work(std::numeric_limits<std::size_t>::max(), to, workers);
+  bands_->work(bands_->units(), all, rays_, from, to, workers);
 }
 
 void SurfaceInterval::advance_samples(const SurfaceNode& from, SurfaceNode& to, std::uint32_t end,

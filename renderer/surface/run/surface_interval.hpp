@@ -14,6 +14,7 @@
 #include "surface/model/entity_exitance.hpp"
 #include "surface/model/surface_model.hpp"
 #include "surface/rays/interval_rays.hpp"
+#include "surface/run/band_exchange.hpp"
 #include "surface/run/column_solve.hpp"
 #include "surface/run/local_steps.hpp"
 #include "surface/run/surface_geometry.hpp"
@@ -47,9 +48,17 @@ class SurfaceInterval {
 
   /// Starts with a new model. `anchors` has the poses of the entities for which the views of its
   /// samples were found. `exchange` says that faces exchange radiation. `turn` is the number
-  /// of intervals before: each has another pattern of sun rays. It allocates.
+  /// of intervals before: each has another pattern of sun rays. With `lights` samples see each
+  /// other in band too; null: they do not. It allocates.
   void reset(const SurfaceModel& model, std::vector<EntityAnchor> anchors, bool exchange,
-             std::uint32_t turn);
+             std::uint32_t turn, const BandLights* lights);
+  /// Finds what samples send to each other in band at the node `from`, with all bounces. Setup.
+  /// @pre begin() with these nodes
+  void settle_bands(const SurfaceSamples& all, const WorldInputs& inputs, SurfaceNode& from,
+                    const SurfaceNode& to, threads::WorkerPool& workers) {
+    bands_->settle(all, rays_, inputs, from, workers);
+    bands_->begin(to, inputs);
+  }
 
   /// Fills forcing, gains and rays for the interval between two nodes, with the poses and the
   /// weather that are known now. Nothing of `to` is computed yet. It advances the surroundings in
@@ -57,7 +66,8 @@ class SurfaceInterval {
   void begin(const SurfaceNode& from, SurfaceNode& to, const SurfaceSamples& all,
              const WorldInputs& inputs, SurfaceHistory& history) noexcept;
   /// Does the work that is due when `passed_frac` of the time has passed, from `from` to `to`:
-  /// first it advances the samples, then it finds the heat between their columns. Samples that have
+  /// first it advances the samples, then it finds the heat between their columns, and last what
+  /// they send to each other in band. Samples that have
   /// a clock of their own in `skipped` are left out; null: none are.
   /// @pre begin() with these nodes
   void compute(const SurfaceNode& from, SurfaceNode& to, double passed_frac,
@@ -68,7 +78,7 @@ class SurfaceInterval {
               const LocalSteps* skipped, threads::WorkerPool& workers) noexcept;
   /// True once `to` is complete.
   [[nodiscard]] bool finished() const noexcept {
-    return done_ == count_ && (columns_->columns() == 0 || columns_->finished());
+    return warm() && bands_->worked() == bands_->units();
   }
   /// Sets the views of entities that the next steps use; they stay in place.
   void see(std::span<const BodyView> views) noexcept { views_ = views; }
@@ -79,7 +89,9 @@ class SurfaceInterval {
     return columns_->stepped_again();
   }
   /// Main memory for the columns, in bytes.
-  [[nodiscard]] std::uint64_t bytes() const noexcept { return columns_ ? columns_->bytes() : 0; }
+  [[nodiscard]] std::uint64_t bytes() const noexcept {
+    return columns_ ? columns_->bytes() + bands_->bytes() : 0;
+  }
 
   [[nodiscard]] const IntervalRays& rays() const noexcept { return rays_; }
   [[nodiscard]] const HeatInterval& heat_interval() const noexcept { return interval_; }
@@ -89,6 +101,14 @@ class SurfaceInterval {
   }
 
  private:
+  /// True once temperatures and cells of `to` are complete.
+  [[nodiscard]] bool warm() const noexcept {
+    return done_ == count_ && (columns_->columns() == 0 || columns_->finished());
+  }
+  /// Does the part of compute() that finds temperatures, and its part of the time.
+  void compute_heat(const SurfaceNode& from, SurfaceNode& to, double passed_frac,
+                    const SurfaceSamples& all, const LocalSteps* skipped,
+                    threads::WorkerPool& workers) noexcept;
   /// Advances the samples up to `end` that are not advanced yet.
   void advance_samples(const SurfaceNode& from, SurfaceNode& to, std::uint32_t end,
                        const SurfaceSamples& all, const LocalSteps* skipped,
@@ -108,6 +128,7 @@ class SurfaceInterval {
   std::uint32_t count_ = 0;             ///< samples of the model
   std::uint32_t done_ = 0;              ///< samples that are advanced
   std::optional<ColumnSolve> columns_;  ///< set by reset()
+  std::optional<BandExchange> bands_;   ///< set by reset()
 };
 
 }  // namespace emit::renderer

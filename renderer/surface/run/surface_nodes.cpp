@@ -9,11 +9,12 @@
 namespace emit::renderer {
 
 void SurfaceNodes::begin(std::vector<SampleState> states, std::vector<SampleOutput> outputs,
-                         std::size_t drawn, std::span<const double> body_k) {
+                         std::size_t drawn, std::span<const double> body_k, std::size_t bands) {
   EMIT_CHECK_OP(states.size(), ==, outputs.size());
   ring_ = 0;
   for (SurfaceNode& node : nodes_) {
     node.vertices.assign(drawn, {});
+    node.seen_w_m2_sr.assign(states.size() * bands, 0.0F);
     node.body_k.assign(body_k.begin(), body_k.end());
   }
   for (std::size_t index : {1U, 2U}) {
@@ -49,7 +50,12 @@ void SurfaceNodes::cut(std::int64_t event_ns, std::int64_t end_ns, const LocalSt
   // Move states, outputs and vertices of each sample along the line between the nodes.
   const double frac = fraction_at(event_ns);
   const double end_frac = fraction_at(end_ns);
+  const std::size_t bands =
+      first.states.empty() ? 0 : first.seen_w_m2_sr.size() / first.states.size();
   workers.run(first.states.size(), kSamplesPerTask, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin * bands; i < end * bands; ++i) {
+      first.seen_w_m2_sr[i] = between(first.seen_w_m2_sr[i], second.seen_w_m2_sr[i], frac);
+    }
     for (auto i = static_cast<std::uint32_t>(begin); i < end; ++i) {
       if (frac > 0.0 && !local.has_own_clock(i)) {
         first.states[i] = between(first.states[i], second.states[i], frac);
@@ -73,19 +79,28 @@ void SurfaceNodes::cut(std::int64_t event_ns, std::int64_t end_ns, const LocalSt
   first.at_ns = event_ns;
   second.at_ns = end_ns;
   for (SurfaceNode* node : {&first, &second}) {
-    node->changes.add(0, static_cast<std::uint32_t>(node->vertices.size()));
+    mark_changed(*node);
   }
+}
+
+void SurfaceNodes::mark_changed(SurfaceNode& node) noexcept {
+  const auto drawn = static_cast<std::uint32_t>(node.vertices.size());
+  forget_changes(node);
+  node.changes.add(0, drawn);
+  if (!node.seen_w_m2_sr.empty()) node.seen_changes.add(0, drawn);
 }
 
 void SurfaceNodes::mark_all_changed() noexcept {
-  for (SurfaceNode& node : nodes_) {
-    node.changes.clear();
-    node.changes.add(0, static_cast<std::uint32_t>(node.vertices.size()));
-  }
+  for (SurfaceNode& node : nodes_) mark_changed(node);
+}
+
+void SurfaceNodes::forget_changes(SurfaceNode& node) noexcept {
+  node.changes.clear();
+  node.seen_changes.clear();
 }
 
 void SurfaceNodes::forget_changes() noexcept {
-  for (SurfaceNode& node : nodes_) node.changes.clear();
+  for (SurfaceNode& node : nodes_) forget_changes(node);
 }
 
 float SurfaceNodes::fraction(std::int64_t now_ns) const noexcept {
@@ -106,7 +121,8 @@ std::uint64_t SurfaceNodes::bytes() const noexcept {
   const auto bytes_of = [](const auto& values) { return values.capacity() * sizeof(values[0]); };
   std::uint64_t sum = 0;
   for (const SurfaceNode& node : nodes_) {
-    sum += bytes_of(node.states) + bytes_of(node.outputs) + bytes_of(node.vertices);
+    sum += bytes_of(node.states) + bytes_of(node.outputs) + bytes_of(node.vertices) +
+           bytes_of(node.seen_w_m2_sr);
   }
   return sum;
 }

@@ -21,9 +21,10 @@ namespace emit::renderer {
 class SurfaceNodes {
  public:
   /// Makes node 0 of these states, outputs and interiors of bodies, and takes memory for the
-  /// others. The first `drawn` samples are vertices. @pre states and outputs have equal sizes
+  /// others. The first `drawn` samples are vertices. Samples see others in `bands` bands, from 0
+  /// on. @pre states and outputs have equal sizes
   void begin(std::vector<SampleState> states, std::vector<SampleOutput> outputs, std::size_t drawn,
-             std::span<const double> body_k);
+             std::span<const double> body_k, std::size_t bands);
 
   /// A node. @pre index < 3
   [[nodiscard]] SurfaceNode& operator[](std::size_t index) noexcept {
@@ -48,6 +49,7 @@ class SurfaceNodes {
 
   void mark_all_changed() noexcept;
   void forget_changes() noexcept;
+  static void forget_changes(SurfaceNode& node) noexcept;
 
   /// Place of an instant between nodes 0 and 1, 0 to 1.
   [[nodiscard]] float fraction(std::int64_t now_ns) const noexcept;
@@ -58,6 +60,8 @@ class SurfaceNodes {
   [[nodiscard]] std::uint64_t bytes() const noexcept;
 
  private:
+  static void mark_changed(SurfaceNode& node) noexcept;
+
   std::array<SurfaceNode, 3> nodes_;
   std::size_t ring_ = 0;  ///< storage of node 0
 };

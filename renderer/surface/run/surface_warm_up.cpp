@@ -52,7 +52,8 @@ physics::Result<SurfaceModel> SurfaceWarmUp::build() const {
                              record,
                              placements_,
                              geometry.detail(),
-                             ways_m};
+                             ways_m,
+                             in_.options.exchange ? in_.world.lights : nullptr};
   auto model = build_surface_model(inputs, in_.view, in_.options, in_.progress);
   if (!model) return model;
   model->at_ns = in_.start_ns;

@@ -5,15 +5,18 @@
 #include "history/environment.hpp"
 #include "history/part_history.hpp"
 #include "history/pose_history.hpp"
+#include "surface/heat/band_lights.hpp"
 
 namespace emit::renderer {
 
-/// Sun, weather, poses of the entities and drives of their parts, which a surface follows. All must
-/// outlive the call that gets them.
+/// Sun, weather, poses of the entities, drives of their parts and light in band, which a surface
+/// follows. All must outlive the call that gets them.
 struct WorldInputs {
   const Environment& environment;
   std::span<const PoseHistory> entities;
   std::span<const PartHistory> parts{};  ///< ascending by entity
+  /// Light in the bands of the picture. Null: samples send nothing to each other there.
+  const BandLights* lights = nullptr;
 };
 
 }  // namespace emit::renderer

@@ -47,6 +47,8 @@ PatchSampler::PatchSampler(const SurfaceInputs& inputs, const DriveSensitivity& 
                            const SurfaceModelOptions& options)
     : in_(inputs),
       options_(options),
+      held_(inputs.geometry, inputs.materials, inputs.entity_of_object,
+            inputs.places.origin_world_m()),
       view_(kSampleViewRays),
       sky_(inputs.heat.sky_measure() == SkyMeasure::cosine ? kSampleSkyRays : kSampleViewRays),
       sphere_(kSampleViewRays),
@@ -91,6 +93,8 @@ bool PatchSampler::inherit_view(SurfacePatch& patch, std::uint32_t index,
   const float limit_frac = sky_limit_frac_[sample.material];
   const float surplus_frac = std::max(patch.sky_surplus_frac[a], patch.sky_surplus_frac[b]);
   if (surplus_frac > limit_frac || low.covered || high.covered) return false;
+  // What hot faces send bends where the sky does not.
+  if (patch.held[a].frac > 0.0F || patch.held[b].frac > 0.0F) return false;
   const float edge_m = glm::distance(low.position_m, high.position_m);
   if (kFreeLengths * edge_m > std::min(low.flat_m, high.flat_m)) return false;
   const glm::vec3 to_sky = 0.5F * (patch.to_sky[a] + patch.to_sky[b]);
@@ -199,6 +203,8 @@ void PatchSampler::look_at_faces(SurfacePatch& patch, std::uint32_t index, const
     const SeenFace& face = view.seen[i];
     seen.push_back({face.instance, face.triangle, face.barycentric, face.weight_frac, !face.front});
   }
+  patch.held[index] = {};
+  if (!held_.empty()) take_held(patch, index, point, selection);
   SurfaceSample& sample = patch.samples[index];
   // Let surroundings fill the rest if no face was met.
   if (seen.empty()) sample.far_frac = 1.0F - sample.sky_frac;
@@ -280,19 +286,73 @@ bool PatchSampler::of_a_sheet(const SeenFace& face) const noexcept {
   });
 }
 
+void PatchSampler::take_held(SurfacePatch& patch, std::uint32_t index, const ViewPoint& point,
+                             const CasterSelection& selection) const {
+  const auto material_of = [&](std::uint32_t instance, std::uint32_t triangle) -> const auto& {
+    const scene::Mesh& mesh = in_.geometry.meshes[in_.geometry.instances[instance].mesh];
+    const auto found = std::ranges::find_if(mesh.submeshes, [&](const scene::Submesh& submesh) {
+      return 3 * triangle >= submesh.first_index &&
+             3 * triangle < submesh.first_index + submesh.index_count;
+    });
+    return in_.materials[found->material];
+  };
+  std::vector<HeldFaces::Part> parts;
+  held_.seen_from(in_.places, point, selection, parts);
+  std::vector<SeenPlace>& seen = patch.seen[index];
+  SurfaceSample& sample = patch.samples[index];
+  HeldView& held = patch.held[index];
+  for (const HeldFaces::Part& part : parts) {
+    const scene::Material& material = material_of(part.instance, part.triangle);
+    held.frac += part.frac;
+    held.longwave_w_m2 += part.frac * static_cast<float>(material.emissivity_frac *
+                                                         physics::kStefanBoltzmannWPerM2K4 *
+                                                         std::pow(*material.prescribed_k, 4.0));
+    for (std::size_t b = 0; in_.lights != nullptr && b < in_.lights->bands(); ++b) {
+      const auto of_material = static_cast<std::uint32_t>(&material - in_.materials.data());
+      held.sent_w_m2_sr[b] +=
+          part.frac * in_.lights->emissivity_frac(of_material, b) *
+          in_.lights->black_w_m2_sr(b, static_cast<float>(*material.prescribed_k));
+    }
+  }
+  // Take what rays found of such faces out.
+  float others_frac = 0.0F;
+  float found_frac = 0.0F;
+  std::erase_if(seen, [&](const SeenPlace& place) {
+    const bool is_held = material_of(place.instance, place.triangle).prescribed_k.has_value();
+    (is_held ? found_frac : others_frac) += place.weight_frac;
+    return is_held;
+  });
+  if (parts.empty() && found_frac == 0.0F) return;
+  // Let all else share the rest of the hemisphere as before.
+  const float closed_frac = std::max(0.0F, 1.0F - sample.sky_frac - sample.far_frac);
+  const float all_frac = others_frac + found_frac;
+  const float others_now_frac = all_frac > 0.0F ? closed_frac * others_frac / all_frac : 0.0F;
+  const float rest_frac = sample.sky_frac + sample.far_frac + others_now_frac;
+  const float scale = rest_frac > 0.0F ? std::max(0.0F, 1.0F - held.frac) / rest_frac : 0.0F;
+  sample.sky_frac *= scale;
+  sample.far_frac *= scale;
+  for (SeenPlace& place : seen) place.weight_frac *= scale * others_now_frac / others_frac;
+  const glm::vec2 middle(1.0F / 3.0F);
+  for (const HeldFaces::Part& part : parts) {
+    seen.push_back({part.instance, part.triangle, middle, part.frac, part.behind});
+  }
+}
+
 void PatchSampler::integrate(std::span<const NewSample> samples, StartMemo& memo) const {
   const HistoryRecord& record = in_.record;
   const std::size_t count = record.size();
   const bool keeps = keeps_sent();
-  // Count everything seen as surroundings, because samples are not numbered yet.
+  // Count everything seen as surroundings, because samples are not numbered yet. Only what faces of
+  // a prescribed temperature send is known.
   const auto alone = [](const SurfacePatch& side, std::uint32_t index) {
     SurfaceSample sample = side.samples[index];
-    sample.far_frac = 1.0F - sample.sky_frac;
+    sample.far_frac = std::max(0.0F, 1.0F - sample.sky_frac - side.held[index].frac);
     return sample;
   };
   const auto drive_of = [&record](const SurfacePatch& side, std::uint32_t index, std::size_t i) {
     SampleDrive drive;
     drive.sun_frac = side.sun_frac.row(index)[i];
+    drive.longwave_begin_w_m2 = drive.longwave_end_w_m2 = side.held[index].longwave_w_m2;
     drive.take_entity(record.intervals[i].entities, side.samples[index]);
     if (side.hidden_sky.length() != 0) drive.hidden_sky_frac = side.hidden_sky.row(index)[i].frac;
     return drive;
@@ -404,6 +464,7 @@ void SurfacePatch::grow(std::size_t vertices) {
   outputs.resize(vertices);
   surplus_k.resize(vertices, -1.0F);
   to_sky.resize(vertices);
+  held.resize(vertices);
   sky_surplus_frac.resize(vertices, kUnknown);
   sun_frac.grow(vertices);
   hidden_sky.grow(vertices);
@@ -419,6 +480,7 @@ void SurfacePatch::free_all_but_rows() {
   outputs = {};
   surplus_k = {};
   to_sky = {};
+  held = {};
   sky_surplus_frac = {};
   if (back) back->free_all_but_rows();
 }

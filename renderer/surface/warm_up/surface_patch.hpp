@@ -13,6 +13,7 @@
 
 #include "surface/model/drive_sensitivity.hpp"
 #include "surface/model/surface_model.hpp"
+#include "surface/rays/held_faces.hpp"
 #include "surface/rays/sphere_view.hpp"
 #include "surface/warm_up/sent_history.hpp"
 #include "surface/warm_up/sun_tracer.hpp"
@@ -26,6 +27,14 @@ struct SeenPlace {
   glm::vec2 barycentric{0.0F};
   float weight_frac = 0.0F;
   bool behind = false;  ///< the side that its winding calls inside is seen
+};
+
+/// Part of a view that shows faces with a prescribed temperature: what they send is known before
+/// samples exchange radiation.
+struct HeldView {
+  float frac = 0.0F;                             ///< of the hemisphere
+  float longwave_w_m2 = 0.0F;                    ///< times that share
+  std::array<float, kMostBands> sent_w_m2_sr{};  ///< by band, times that share
 };
 
 /// Samples of one instance while its mesh is being refined. Arrays are by vertex of the mesh.
@@ -50,6 +59,8 @@ struct SurfacePatch {
   /// none.
   std::vector<float> surplus_k;
   std::vector<glm::vec3> to_sky;  ///< ViewShares::to_sky
+  /// Share of the hemisphere that shows faces with a prescribed temperature, and what they send.
+  std::vector<HeldView> held;
   /// Greatest difference of the shares of sky and surroundings from the mean of the vertex's
   /// parents. It is infinite if the vertex has no parents, and until the difference is known.
   std::vector<float> sky_surplus_frac;
@@ -136,6 +147,11 @@ class PatchSampler {
   /// is not inside a body.
   [[nodiscard]] bool of_a_sheet(const SeenFace& face) const noexcept;
 
+  /// Puts faces of a prescribed temperature into a view by their areas, in place of what rays found
+  /// of them.
+  void take_held(SurfacePatch& patch, std::uint32_t index, const ViewPoint& point,
+                 const CasterSelection& selection) const;
+
   /// Finds the shares of sky and surroundings of a sample by rays, and whether it is covered.
   void look_around(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand) const;
 
@@ -150,6 +166,7 @@ class PatchSampler {
 
   const SurfaceInputs& in_;
   SurfaceModelOptions options_;
+  HeldFaces held_;
   ViewSampler view_;
   ViewSampler sky_;
   SphereSampler sphere_;

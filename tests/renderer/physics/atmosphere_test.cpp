@@ -91,8 +91,8 @@ TEST(AtmosphereTable, OneElevationHoldsForAll) {
     EXPECT_NEAR(table->along(500.0, sine).transmittance_frac, std::exp(-0.05), 1e-14);
     EXPECT_FALSE(table->along(500.0, sine).clamped);
   }
-  // A uniform sky is its own hemispherical mean.
-  EXPECT_NEAR(table->sky_hemisphere_w_m2_sr(), (1.0 - std::exp(-0.1)) * kAirRadiance, 1e-12);
+  // The sky is the air of the last range.
+  EXPECT_NEAR(table->out(0.5).path_radiance_w_m2_sr, (1.0 - std::exp(-0.1)) * kAirRadiance, 1e-12);
 }
 
 TEST(AtmosphereTable, OpaqueAirStaysFinite) {

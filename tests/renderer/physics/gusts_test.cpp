@@ -19,7 +19,8 @@ TEST(Gusts, LandGivesTheAirWhatTheSchemeSays) {
   const double rise = 144.7 / 66.9;
   const double dry = (0.5 * rise + 1.0) / (rise + 1.0);
   const double net_w_m2 = (0.8 * 800.0 + 350.0 - 418.8) / (1.0 + 0.38 * dry);
-  const ConvectionDrive noon{.global_sun_w_m2 = 800.0, .longwave_down_w_m2 = 350.0, .air_k = 293.15};
+  const ConvectionDrive noon{
+      .global_sun_w_m2 = 800.0, .longwave_down_w_m2 = 350.0, .air_k = 293.15};
   EXPECT_NEAR(land_heat_w_m2(noon), 0.9 * dry * net_w_m2 - 10.0, 3.0);
   // De Bruin and Holtslag (1982) measured 150 to 300 W/m2 between wet grass and dry land.
   EXPECT_GT(land_heat_w_m2(noon), 150.0);
@@ -41,11 +42,11 @@ TEST(Gusts, GrowWithTheSunOverAllClimates) {
     for (const double pressure_pa : {50'000.0, 101'325.0}) {
       double before_m_s = 0.0;
       for (double sun_w_m2 = 0.0; sun_w_m2 <= 1200.0; sun_w_m2 += 50.0) {
-        const double gust_m_s = convective_gust_m_s(
-            {.global_sun_w_m2 = sun_w_m2,
-             .longwave_down_w_m2 = 0.8 * 5.670374e-8 * std::pow(air_k, 4.0),
-             .air_k = air_k,
-             .pressure_pa = pressure_pa});
+        const double gust_m_s =
+            convective_gust_m_s({.global_sun_w_m2 = sun_w_m2,
+                                 .longwave_down_w_m2 = 0.8 * 5.670374e-8 * std::pow(air_k, 4.0),
+                                 .air_k = air_k,
+                                 .pressure_pa = pressure_pa});
         EXPECT_GE(gust_m_s, before_m_s) << air_k << " K, " << sun_w_m2 << " W/m2";
         EXPECT_LT(gust_m_s, 4.5);
         before_m_s = gust_m_s;

@@ -245,4 +245,21 @@ TEST(Weather, ClearSkyJoinsTheModels) {
 }
 
 }  // namespace
+TEST(SkyByTilt, MatchesClosedForms) {
+  // An even sky is the same for all faces.
+  for (const double radiance : sky_by_tilt([](double) { return 7.0; })) {
+    EXPECT_NEAR(radiance, 7.0, 1e-12);
+  }
+  // A sky in proportion to the sine of the elevation: 2/3 of the zenith before a level face, 4/(3
+  // pi) before an upright one, and nothing at the horizon.
+  const SkyByTilt sine = sky_by_tilt([](double sin_elevation) { return sin_elevation; });
+  EXPECT_NEAR(sky_at_tilt(sine, 1.0), 2.0 / 3.0, 1e-5);
+  EXPECT_NEAR(sky_at_tilt(sine, 0.0), 4.0 / (3.0 * kPi), 2e-3);
+  EXPECT_NEAR(sky_at_tilt(sine, -1.0), 0.0, 1e-12);
+  // The mean over azimuths of the cosine is the projection that the face and the ring share.
+  EXPECT_NEAR(tilted_cosine(1.0, 0.4), 0.4, 1e-15);
+  EXPECT_NEAR(tilted_cosine(-1.0, 0.4), 0.0, 1e-15);
+  EXPECT_NEAR(tilted_cosine(0.0, 0.0), 1.0 / kPi, 1e-15);
+}
+
 }  // namespace emit::physics

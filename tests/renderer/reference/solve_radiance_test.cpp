@@ -85,12 +85,15 @@ TEST(ReferenceSky, agrees_with_the_tables_of_the_renderer_under_clouds) {
                     expected, 0.02 * expected)
             << band.name << ' ' << longwave_w_m2 << ' ' << elevation_deg;
       }
-      const double mean = (1.0 - sky_now.cloud_cover_frac) *
-                              views[0].clear_sky_mean_w_m2_sr(scenario.place.height_m,
-                                                              warmer_k + sky_now.warmer_k * fade) +
-                          sky_now.cloud_cover_frac * cloud;
-      EXPECT_NEAR(mean, own->sky_mean(), 0.01 * own->sky_mean())
-          << band.name << ' ' << longwave_w_m2;
+      const physics::SkyByTilt clear = views[0].clear_sky_by_tilt_w_m2_sr(
+          scenario.place.height_m, warmer_k + sky_now.warmer_k * fade);
+      for (const double normal_up : {1.0, 0.9, 0.5, 0.0, -0.5, -0.9}) {
+        const double mean =
+            (1.0 - sky_now.cloud_cover_frac) * physics::sky_at_tilt(clear, normal_up) +
+            sky_now.cloud_cover_frac * cloud;
+        EXPECT_NEAR(mean, own->sky_mean(normal_up), 0.01 * own->sky_mean(normal_up))
+            << band.name << ' ' << longwave_w_m2 << ", normal up " << normal_up;
+      }
     }
   }
 }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "emit/physics/air_model.hpp"
+#include "emit/physics/sky_state.hpp"
 
 /// The air model as the shader reads it: a small table around the sensor (physics.md eq. 39). The
 /// shader evaluates the same equations in float32 (shaders/lib/air_view.glsl).
@@ -63,9 +64,10 @@ class AirView {
   void at(double sensor_m, const Weather& weather, std::span<Node> out) const noexcept;
   static constexpr double kMostWarmerK = 40.0;
 
-  /// Returns the cosine-weighted mean of the clear sky's radiance over the upper hemisphere at a
-  /// height, W m-2 sr-1. RT-safe.
-  [[nodiscard]] double clear_sky_mean_w_m2_sr(double height_m, double warmer_k) const noexcept;
+  /// Returns the clear sky's radiance by the tilt of a face at a height, W m-2 sr-1. RT-safe after
+  /// the first call.
+  [[nodiscard]] SkyByTilt clear_sky_by_tilt_w_m2_sr(double height_m,
+                                                    double warmer_k) const noexcept;
   /// Returns the transmittance to space for the third source at a height, by the sine of the
   /// apparent elevation. RT-safe.
   [[nodiscard]] double sun_transmittance_frac(double height_m, double sin_elevation) const noexcept;

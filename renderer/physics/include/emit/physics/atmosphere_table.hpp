@@ -56,10 +56,6 @@ class AtmosphereTable {
   /// Returns the air of the whole path out of the atmosphere: along() at the last range.
   [[nodiscard]] Air out(double sin_elevation) const noexcept;
 
-  /// Returns the cosine-weighted mean of the sky's in-band radiance over the upper hemisphere, W
-  /// m-2 sr-1. Setup only.
-  [[nodiscard]] double sky_hemisphere_w_m2_sr() const;
-
   [[nodiscard]] std::size_t ranges() const noexcept { return range_m_.size(); }
   [[nodiscard]] std::size_t elevations() const noexcept { return sin_elevation_.size(); }
   /// Returns the table for the shader: the ranges, the sines of the elevations, then the pair of

@@ -1,5 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <type_traits>
+
+#include "emit/physics/constants.hpp"
 #include "emit/physics/weather.hpp"
 
 /// One sky for heat and picture: the clouds and the warmth of the air that give the long-wave
@@ -24,5 +31,47 @@ struct SkyState {
 /// @pre air_k > 0
 [[nodiscard]] SkyState sky_state(double longwave_down_w_m2, double air_k, double dew_point_k,
                                  double cloud_frac, const CloudBase& base) noexcept;
+
+/// Mean radiance of the sky as a face sees it, by the tilt of the face: weighted with the cosine to
+/// its normal, over that part of the sky that lies before it (physics.md eq. 44). Node i holds
+/// faces whose unit normal has the vertical component sky_tilt_normal_up(i), from up to down.
+inline constexpr std::size_t kSkyTilts = 17;
+using SkyByTilt = std::array<double, kSkyTilts>;
+/// Returns the vertical component of the normal at a node, 1 to -1. Nodes are uniform in the tilt.
+[[nodiscard]] inline double sky_tilt_normal_up(std::size_t node) noexcept {
+  return std::cos(kPi * static_cast<double>(node) / (kSkyTilts - 1));
+}
+/// Returns the mean over all azimuths of the cosine, not below 0, between a face's normal with that
+/// vertical component and directions of that sine of the elevation.
+[[nodiscard]] double tilted_cosine(double normal_up, double sin_elevation) noexcept;
+/// Returns the sky by tilt for a radiance `sky(sin_elevation)` that is the same all around. A face
+/// that looks straight down sees the horizon.
+template <class Sky>
+[[nodiscard]] SkyByTilt sky_by_tilt(const Sky& sky) {
+  constexpr int kRings = 1024;
+  SkyByTilt out{};
+  SkyByTilt weight{};
+  for (int i = 0; i < kRings; ++i) {
+    const double sine = (i + 0.5) / kRings;
+    const double radiance = sky(sine);
+    for (std::size_t t = 0; t < kSkyTilts; ++t) {
+      const double cosine = tilted_cosine(sky_tilt_normal_up(t), sine);
+      out[t] += cosine * radiance;
+      weight[t] += cosine;
+    }
+  }
+  for (std::size_t t = 0; t + 1 < kSkyTilts; ++t) out[t] /= weight[t];
+  out[kSkyTilts - 1] = sky(0.0);
+  return out;
+}
+/// Returns the sky of a face between the nodes, linear in the tilt.
+template <class Nodes>
+[[nodiscard]] auto sky_at_tilt(const Nodes& nodes, double normal_up) noexcept {
+  using Value = std::remove_cvref_t<decltype(nodes[0])>;
+  const double place = (kSkyTilts - 1) * std::acos(std::clamp(normal_up, -1.0, 1.0)) / kPi;
+  const auto node = std::min(static_cast<std::size_t>(place), kSkyTilts - 2);
+  const auto f = static_cast<Value>(place - static_cast<double>(node));
+  return nodes[node] + f * (nodes[node + 1] - nodes[node]);
+}
 
 }  // namespace emit::physics
