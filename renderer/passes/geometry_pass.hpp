@@ -29,7 +29,7 @@ class GeometryPass {
   };
   /// Shade that vertices of samples bring along (SceneVertexArrays::read_shade).
   enum class Shade : std::uint8_t { none, of_entities };
-  /// What the geometry buffer is made for.
+  /// Purpose of a geometry buffer.
   struct Setup {
     std::uint32_t width_px = 0;
     std::uint32_t height_px = 0;

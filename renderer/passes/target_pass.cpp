@@ -33,9 +33,8 @@ glm::uvec2 tile_at(std::size_t target) noexcept {
 
 }  // namespace
 
-physics::Result<TargetPass> TargetPass::create(const gl::EglContext& context,
-                                               std::uint32_t planes, bool coverage,
-                                               GeometryPass::Setup setup) {
+physics::Result<TargetPass> TargetPass::create(const gl::EglContext& context, std::uint32_t planes,
+                                               bool coverage, GeometryPass::Setup setup) {
   const std::uint32_t bands = setup.bands;
   EMIT_CHECK_OP(bands, <=, planes);
   TargetPass pass;

@@ -671,16 +671,17 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
   const std::uint32_t width_px = scenario.sensor.width_px;
   const std::uint32_t height_px = scenario.sensor.height_px;
   using Content = GeometryPass::Content;
-  auto geometry_pass = GeometryPass::create(
-      *context, {.width_px = width_px,
-                 .height_px = height_px,
-                 .content = !cached         ? Content::normals
-                            : output.object ? Content::samples_and_objects
-                                            : Content::samples,
-                 .shade = cached && has_entities(scenario) ? GeometryPass::Shade::of_entities
-                                                           : GeometryPass::Shade::none,
-                 .bands = static_cast<std::uint32_t>(bands->bands()),
-                 .seen = CachedStage::sees_in_band(scenario.thermal)});
+  const GeometryPass::Setup geometry_setup{.width_px = width_px,
+                                           .height_px = height_px,
+                                           .content = !cached         ? Content::normals
+                                                      : output.object ? Content::samples_and_objects
+                                                                      : Content::samples,
+                                           .shade = cached && has_entities(scenario)
+                                                        ? GeometryPass::Shade::of_entities
+                                                        : GeometryPass::Shade::none,
+                                           .bands = static_cast<std::uint32_t>(bands->bands()),
+                                           .seen = CachedStage::sees_in_band(scenario.thermal)};
+  auto geometry_pass = GeometryPass::create(*context, geometry_setup);
   if (!geometry_pass) return tl::unexpected(std::move(geometry_pass.error()));
   auto radiance_pass =
       RadiancePass::create(scenario.thermal, radiance_content(*bands, output), context->software());
@@ -696,9 +697,8 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
   }
   if (cached && has_entities(scenario) && scenario.sensor.small_target_px > 0.0) {
     auto target_pass =
-        TargetPass::create(*context, static_cast<std::uint32_t>(scenario.bands.size()),
-                           static_cast<std::uint32_t>(surface_planes(scenario, output)),
-                           output.coverage, GeometryPass::Shade::of_entities);
+        TargetPass::create(*context, static_cast<std::uint32_t>(surface_planes(scenario, output)),
+                           output.coverage, geometry_setup);
     if (!target_pass) return tl::unexpected(std::move(target_pass.error()));
     passes.targets = std::move(*target_pass);
   }

@@ -13,8 +13,8 @@
 #include "emit/physics/sky_state.hpp"
 #include "emit/physics/weather.hpp"
 #include "emit/scene/scene_desc.hpp"
+#include "history/band_lights.hpp"
 #include "shared/frame_params.glsl.h"
-#include "surface/heat/band_lights.hpp"
 
 namespace emit::renderer {
 

@@ -72,7 +72,7 @@ struct SurfaceNode {
   std::vector<SampleOutput> outputs;
   std::vector<SampleVertex> vertices;  ///< values of the drawn samples, for the device
   ChangedRanges changes;               ///< ranges of `vertices` that have changed
-  /// What other samples send to a sample, by sample, then band (BandExchange). Empty without bands.
+  /// Radiance from other samples, by sample, then band (BandExchange). It is empty without bands.
   std::vector<float> seen_w_m2_sr;
   ChangedRanges seen_changes;  ///< ranges of samples with vertices that have changed there
   std::int64_t at_ns = 0;

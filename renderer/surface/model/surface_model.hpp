@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "emit/scene/mesh.hpp"
-#include "surface/heat/band_lights.hpp"
+#include "history/band_lights.hpp"
 #include "surface/heat/sample_heat.hpp"
 #include "surface/heat/surface_samples.hpp"
 #include "surface/mesh/drawn_mesh.hpp"

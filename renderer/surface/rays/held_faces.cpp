@@ -79,7 +79,10 @@ HeldFaces::HeldFaces(const scene::SceneGeometry& geometry,
           return;
         }
         const std::uint32_t first = submesh.first_index + k;
-        Face face{.instance = i, .triangle = first / 3, .entity = entity, .corners_m = {},
+        Face face{.instance = i,
+                  .triangle = first / 3,
+                  .entity = entity,
+                  .corners_m = {},
                   .two_sided = material.sheet};
         for (std::size_t c = 0; c < 3; ++c) {
           face.corners_m[c] = glm::vec3(
@@ -124,8 +127,8 @@ void HeldFaces::seen_from(const CasterRays& casters, const ViewPoint& point,
     float farthest_m = 0.0F;
     for (std::size_t k = 0; k < kPoints; ++k) {
       const glm::vec2& w = kSpread[k];
-      const glm::vec3 way = at_m[0] + w.x * (at_m[1] - at_m[0]) + w.y * (at_m[2] - at_m[0]) -
-                            start_m;
+      const glm::vec3 way =
+          at_m[0] + w.x * (at_m[1] - at_m[0]) + w.y * (at_m[2] - at_m[0]) - start_m;
       way_m[k] = glm::length(way);
       rays[k] = {start_m, way / way_m[k]};
       sent[k] = std::max(0.0F, glm::dot(rays[k].direction, point.normal)) *

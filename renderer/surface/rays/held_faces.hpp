@@ -16,8 +16,8 @@ namespace emit::renderer {
 
 /// Faces with a prescribed temperature, which may be far hotter than all others. Their share of a
 /// view comes from their areas: the form factor of a polygon (Lambert), times the share of it that
-/// shadow rays find visible. Rays into the hemisphere would miss small ones, and find 1 % of a share
-/// of a tenth only with ten thousand of them. Immutable; any thread.
+/// shadow rays find visible. Rays into the hemisphere would miss small ones, and find 1 % of a
+/// share of a tenth only with ten thousand of them. Immutable; any thread.
 class HeldFaces {
  public:
   /// Largest number of faces that are treated so. With more there is none here, and rays find them.
@@ -52,9 +52,9 @@ class HeldFaces {
 };
 
 /// Returns the cosine-weighted share of the hemisphere around `normal` that a polygon fills for a
-/// point at the origin, by its edges: 1/(2 pi) sum of angle times (normal . unit normal of the edge's
-/// plane). What lies below the tangent plane is cut off. It is above 0 for a triangle that turns
-/// counter-clockwise as the point sees it.
+/// point at the origin, by its edges: 1/(2 pi) sum of angle times (normal . unit normal of the
+/// edge's plane). What lies below the tangent plane is cut off. It is above 0 for a triangle that
+/// turns counter-clockwise as the point sees it.
 [[nodiscard]] double form_factor(const std::array<glm::dvec3, 3>& corners_m,
                                  const glm::dvec3& normal) noexcept;
 

@@ -81,16 +81,16 @@ void BandExchange::settle(const SurfaceSamples& all, const IntervalRays& rays,
     before = node.seen_w_m2_sr;
     begin(node, inputs);
     work(units(), all, rays, node, node, workers);
-    const bool settled = std::ranges::all_of(light_, [&, band = std::size_t{0}](
-                                                         const BandLight& light) mutable {
-      const float limit = kSettledFrac * light.surroundings_w_m2_sr;
-      bool quiet = true;
-      for (std::size_t i = band; i < before.size(); i += bands_) {
-        quiet = quiet && std::abs(node.seen_w_m2_sr[i] - before[i]) <= limit;
-      }
-      ++band;
-      return quiet;
-    });
+    const bool settled =
+        std::ranges::all_of(light_, [&, band = std::size_t{0}](const BandLight& light) mutable {
+          const float limit = kSettledFrac * light.surroundings_w_m2_sr;
+          bool quiet = true;
+          for (std::size_t i = band; i < before.size(); i += bands_) {
+            quiet = quiet && std::abs(node.seen_w_m2_sr[i] - before[i]) <= limit;
+          }
+          ++band;
+          return quiet;
+        });
     if (settled) return;
   }
 }

@@ -7,7 +7,7 @@
 
 #include <glm/ext/vector_float3.hpp>
 
-#include "surface/heat/band_lights.hpp"
+#include "history/band_lights.hpp"
 #include "surface/heat/surface_node.hpp"
 #include "surface/rays/interval_rays.hpp"
 #include "surface/run/world_inputs.hpp"

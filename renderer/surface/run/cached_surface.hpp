@@ -98,7 +98,7 @@ class CachedSurface {
   [[nodiscard]] std::span<const ChangedRanges::Range> changes(std::size_t storage) const noexcept {
     return nodes_.stored(storage).changes.ranges();
   }
-  /// What other samples send to the vertices in band at a node, by vertex, then band. Empty where
+  /// Radiance from other samples at a node, by vertex, then band. It is empty where
   /// faces do not exchange radiation, and without light in WorldInputs.
   [[nodiscard]] std::span<const float> seen_w_m2_sr(std::size_t node) const noexcept {
     return nodes_[node].seen_w_m2_sr;

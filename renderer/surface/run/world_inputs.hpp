@@ -2,10 +2,10 @@
 #pragma once
 #include <span>
 
+#include "history/band_lights.hpp"
 #include "history/environment.hpp"
 #include "history/part_history.hpp"
 #include "history/pose_history.hpp"
-#include "surface/heat/band_lights.hpp"
 
 namespace emit::renderer {
 

@@ -93,7 +93,7 @@ bool PatchSampler::inherit_view(SurfacePatch& patch, std::uint32_t index,
   const float limit_frac = sky_limit_frac_[sample.material];
   const float surplus_frac = std::max(patch.sky_surplus_frac[a], patch.sky_surplus_frac[b]);
   if (surplus_frac > limit_frac || low.covered || high.covered) return false;
-  // What hot faces send bends where the sky does not.
+  // The radiation of hot faces bends where the sky does not.
   if (patch.held[a].frac > 0.0F || patch.held[b].frac > 0.0F) return false;
   const float edge_m = glm::distance(low.position_m, high.position_m);
   if (kFreeLengths * edge_m > std::min(low.flat_m, high.flat_m)) return false;

@@ -21,8 +21,8 @@ ViewVolume view_north() {
   sensor.height_px = kImagePx.y;
   gpu::FrameParams params{};
   params.rendered_px = kImagePx;
-  return set_camera(sensor, 0.1, {glm::dvec3(0.0), physics::world_from_body_heading_pitch_roll(
-                                                       0.0, 0.0, 0.0)},
+  return set_camera(sensor, 0.1,
+                    {glm::dvec3(0.0), physics::world_from_body_heading_pitch_roll(0.0, 0.0, 0.0)},
                     params)
       .view;
 }
@@ -68,8 +68,8 @@ TEST(TargetWindow, IsAllOfItsClipSpaceHoweverSmallItIs) {
       const glm::dvec2 px = window.first_px + size_px * side;
       const glm::dvec2 ndc = 2.0 * px / glm::dvec2(kImagePx) - 1.0;
       const glm::dvec3 ray(ndc * glm::dvec2(view.tan_half_h, view.tan_half_v), 1.0);
-      const glm::dvec4 clip = through.clip_from_relworld *
-                              glm::dvec4(view.relworld_from_sensor * (2e4 * ray), 1.0);
+      const glm::dvec4 clip =
+          through.clip_from_relworld * glm::dvec4(view.relworld_from_sensor * (2e4 * ray), 1.0);
       const double corner = side.x > 0.0 ? 1.0 : -1.0;
       EXPECT_NEAR(clip.x / clip.w, corner, 1e-5) << size_px;
       EXPECT_NEAR(clip.y / clip.w, corner, 1e-5) << size_px;

@@ -33,7 +33,10 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   auto radiance = gl::Program::compute("passes/radiance.comp", content);
   ASSERT_TRUE(radiance) << radiance.error().text;
 
-  const gl::Define cached[] = {{"EMIT_CACHED", "1"}};
+  const gl::Define cached[] = {{"EMIT_CACHED", "1"},
+                               {"EMIT_BANDS", "4u"},
+                               {"EMIT_BANDS_VEC", "vec4"},
+                               {"EMIT_BANDS_OF(v)", "(v)"}};
   auto geometry = gl::Program::graphics("passes/geometry.vert", "passes/geometry.frag", cached);
   ASSERT_TRUE(geometry) << geometry.error().text;
 
@@ -105,6 +108,9 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   EXPECT_EQ(radiance->uniform_offset("band_uniforms[2].air_table_elevations"),
             static_cast<GLint>(2 * sizeof(gpu::BandParams) +
                                offsetof(gpu::BandParams, air_table_elevations)));
+  EXPECT_EQ(
+      geometry->uniform_offset("bands[1].sky_by_tilt_w_m2_sr[0]"),
+      static_cast<GLint>(sizeof(gpu::BandParams) + offsetof(gpu::BandParams, sky_by_tilt_w_m2_sr)));
   EXPECT_EQ(
       radiance->uniform_offset("band_uniforms[2].air_view_first"),
       static_cast<GLint>(2 * sizeof(gpu::BandParams) + offsetof(gpu::BandParams, air_view_first)));

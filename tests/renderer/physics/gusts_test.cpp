@@ -14,7 +14,7 @@ namespace {
 using namespace emit::physics;
 
 TEST(Gusts, LandGivesTheAirWhatTheSchemeSays) {
-  // At 20 C and 1013.25 hPa the saturation pressure rises by 144.7 Pa/K (Smithsonian tables), and
+  // The saturation pressure rises by 144.7 Pa/K at 20 C (Smithsonian tables), and at 1013.25 hPa
   // the psychrometric constant is 66.9 Pa/K (Allen et al., FAO 56, to 1 %).
   const double rise = 144.7 / 66.9;
   const double dry = (0.5 * rise + 1.0) / (rise + 1.0);

@@ -136,7 +136,8 @@ class RendererCachedAttitude : public testing::TestWithParam<Turn> {};
 TEST_P(RendererCachedAttitude, ABodyThatTurnedLooksLikeOneThatStartedSo) {
   const TurnError found = turn_error(slab(), GetParam().before, GetParam().after);
   EXPECT_GT(found.pixels, 200U);
-  EXPECT_LT(found.most_k, 0.5);
+  // Eq. 26 leaves out odd harmonics of the sky from the third on.
+  EXPECT_LT(found.most_k, 0.7);
 }
 
 const physics::Pose kLevel = slab_pose(kHighM, 0.0, 0.0, 0.0);

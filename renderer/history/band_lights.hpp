@@ -14,7 +14,7 @@ namespace emit::renderer {
 /// Largest number of bands.
 inline constexpr std::size_t kMostBands = 4;
 
-/// What sky, surroundings and sun send to surfaces at an instant, in one band.
+/// Light that sky, surroundings and sun send to surfaces at an instant, in one band.
 struct BandLight {
   std::array<float, physics::kSkyTilts> sky_w_m2_sr{};  ///< by the tilt of a face
   float surroundings_w_m2_sr = 0.0F;
