@@ -37,7 +37,7 @@ done
 if [[ -n $out ]]; then out=$(realpath -m "$out"); fi
 cd "$(dirname "$0")/../.."
 out=${out:-$PWD/out/bench}
-known=(paper error-vs-time scaling crowd turn live budget thermal-truth convergence stability stream isolation)
+known=(paper error-vs-time scaling crowd turn live budget thermal-truth convergence subpixel stability stream isolation)
 if ((${#suites[@]} == 0)); then suites=("${known[@]}"); fi
 for suite in "${suites[@]}"; do
   if [[ " ${known[*]} " != *" $suite "* ]]; then
@@ -56,6 +56,7 @@ arguments() { # of a suite, when quick
     live) echo "--seconds 2 --rate 10 --every 1 --set thermal.tolerance_k=5" ;;
     budget) echo "--frames 30 --set thermal.tolerance_k=5" ;;
     thermal-truth) echo "--width 64 --height 48 --steps 9" ;;
+    subpixel) echo "--phases 10 --pairs 15" ;;
     stability) echo "--cases 100000 --part equilibrium" ;;
     stream) echo "--frames 300 --repeats 1" ;;
     isolation) echo "--pairs 2" ;;

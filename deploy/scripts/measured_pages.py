@@ -38,6 +38,11 @@ FILES = {
             "What must not change a temperature: splitting the history, moving the camera, a restart. And the print of "
             "a vehicle after it has left, against the converged history.",
             "emit bench thermal-truth"),
+        "subpixel": (
+            "Energy of a small target above its background, against the solid angle of its faces: random places and "
+            "attitudes, then the largest change from frame to frame while it closes in by 1 % a frame. `window` is the "
+            "renderer's way, `centre` one sample per pixel (`sensor.small_target_px = 0`).",
+            "emit bench subpixel"),
         "scaling": (
             "Frame time over one quantity at a time. Ratios are medians of interleaved pairs of frames.",
             "emit bench scaling --method cached"),
@@ -156,6 +161,25 @@ def truth_tables(rows):
                  ("p99, K", field("p99_error_k", 2)), ("max, K", field("max_error_k", 2))], rows)
 
 
+def subpixel_tables(rows):
+    def worst(name):
+        def read(row):
+            return percent(row[name], 2)
+        return read
+    # The largest figures of all quality levels stand in one row of each method and size.
+    worst_rows = {}
+    for row in rows:
+        key = (row["method"], row["size_px"])
+        kept = worst_rows.setdefault(key, dict(row, levels=0))
+        kept["levels"] += 1
+        for name in ("rms_energy_error_frac", "absent_frac", "step_frac"):
+            kept[name] = max(kept[name], row[name])
+    yield table([("size, px", field("size_px")), ("method", field("method")), ("quality levels", field("levels")),
+                 ("RMS of the energy", worst("rms_energy_error_frac")), ("absent", worst("absent_frac")),
+                 ("largest step", worst("step_frac")), ("one target costs", lambda row: percent(row["cost_frac"]))],
+                list(worst_rows.values()))
+
+
 def scaling_tables(rows):
     def itself(row):
         ratio = row["self_ratio"]
@@ -235,8 +259,8 @@ def isolation_tables(rows):
 
 
 TABLES = {"paper": paper_tables, "error-vs-time": error_tables, "thermal-truth": truth_tables,
-          "scaling": scaling_tables, "crowd": crowd_tables, "turn": turn_tables, "budget": budget_tables,
-          "live": live_tables, "stream": stream_tables, "isolation": isolation_tables}
+          "subpixel": subpixel_tables, "scaling": scaling_tables, "crowd": crowd_tables, "turn": turn_tables,
+          "budget": budget_tables, "live": live_tables, "stream": stream_tables, "isolation": isolation_tables}
 
 
 def load(folder):

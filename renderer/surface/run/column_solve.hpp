@@ -7,7 +7,7 @@
 
 #include "surface/heat/sample_heat.hpp"
 #include "surface/heat/surface_node.hpp"
-#include "surface/warm_up/column_system.hpp"
+#include "surface/heat/column_system.hpp"
 #include "threads/worker_pool.hpp"
 
 namespace emit::renderer {

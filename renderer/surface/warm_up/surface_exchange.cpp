@@ -13,7 +13,7 @@
 #include "surface/mesh/sheet_sides.hpp"
 #include "surface/model/entity_exitance.hpp"
 #include "surface/warm_up/body_courses.hpp"
-#include "surface/warm_up/column_system.hpp"
+#include "surface/heat/column_system.hpp"
 #include "surface/warm_up/fixed_point_mixer.hpp"
 
 namespace emit::renderer {

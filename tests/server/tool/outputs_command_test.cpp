@@ -95,6 +95,7 @@ const std::vector<OutputCase>& output_cases() {
     add({"bench", "turn"}, {"--json"});
     add({"bench", "live"}, {"--json"});
     add({"bench", "budget"}, {"--json"});
+    add({"bench", "subpixel"}, {"--json"});
     add({"bench", "nature", "no.csv"}, {"--json", "--plot"});
     return out;
   }();

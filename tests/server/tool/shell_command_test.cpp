@@ -106,7 +106,7 @@ TEST_F(BashCompletion, offers_the_options_of_the_command_in_the_line) {
 }
 
 TEST_F(BashCompletion, offers_values_files_and_folders) {
-  const std::set<std::string> channels{"temperature", "depth", "object"};
+  const std::set<std::string> channels{"temperature", "depth", "object", "coverage"};
   EXPECT_EQ(candidates({"render", "--channel", ""}), channels);
   EXPECT_EQ(candidates({"render", "--channel", "=", "te"}), std::set<std::string>{"temperature"});
   EXPECT_EQ(candidates({"render", "--channel", "="}), channels);
@@ -137,8 +137,8 @@ TEST(ShellCompletion, zsh_and_fish_have_every_command_and_option_that_bash_has) 
     EXPECT_NE(fish.find("'__emit_at emit' -a " + command + " -d "), std::string::npos) << command;
   }
   EXPECT_NE(zsh.find("'*--channel=["), std::string::npos);
-  EXPECT_NE(zsh.find(":(temperature depth object)'"), std::string::npos);
-  EXPECT_NE(fish.find("'__emit_at emit render' -l channel -r -f -a 'temperature depth object'"),
+  EXPECT_NE(zsh.find(":(temperature depth object coverage)'"), std::string::npos);
+  EXPECT_NE(fish.find("'__emit_at emit render' -l channel -r -f -a 'temperature depth object coverage'"),
             std::string::npos);
 }
 
@@ -226,7 +226,7 @@ TEST_F(ManPages, say_what_the_help_says) {
   EXPECT_NE(daemon.find("\\fB\\-\\-config\\fR \\fIFILE\\fR"), std::string::npos);
   EXPECT_NE(daemon.find("75 the device was lost"), std::string::npos);
   const std::string render = read_text(folder_.file("emit-render.1"));
-  EXPECT_NE(render.find("One of: temperature, depth, object."), std::string::npos);
+  EXPECT_NE(render.find("One of: temperature, depth, object, coverage."), std::string::npos);
   EXPECT_NE(render.find("\\fB\\-\\-png\\-of\\fR"), std::string::npos);
   EXPECT_EQ(run_emit({"man", "render"}).out, render);
   EXPECT_EQ(run_emit({"man"}).out, read_text(folder_.file("emit.1")));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "surface/warm_up/column_system.hpp"
+#include "surface/heat/column_system.hpp"
 
 #include <algorithm>
 #include <cmath>
