@@ -28,6 +28,7 @@ bool is_protected(const DaemonConfig& daemon, Port port) noexcept {
     case Port::host:
       return daemon.authenticated_host();
     case Port::metrics:
+    case Port::console:
     case Port::gateway:
       break;
   }
@@ -41,6 +42,7 @@ std::string_view protections_of(Port port) noexcept {
     case Port::host:
       return "'access.allow', 'host.key_file' or '[tls]'";
     case Port::metrics:
+    case Port::console:
     case Port::gateway:
       break;
   }
@@ -60,6 +62,7 @@ void check_access(const Node& root, const DaemonConfig& daemon, Diagnostics& dia
   check(Port::control, "control", "tcp", daemon.control.tcp);
   check(Port::host, "host", "udp", daemon.host.udp);
   check(Port::metrics, "metrics", "listen", daemon.metrics.listen);
+  check(Port::console, "console", "listen", daemon.console.listen);
   // The port of a CIGI host takes messages from the address of that host alone.
   check(Port::gateway, "dis", "listen", daemon.dis.listen);
   check(Port::gateway, "net_fdm", "listen", daemon.net_fdm.listen);

@@ -226,6 +226,8 @@ void check_combinations(const Node& root, const DaemonConfig& daemon, Diagnostic
   }
   check_endpoint(section(root, "metrics", reported_before), "listen", daemon.metrics.listen, true,
                  diagnostics);
+  check_endpoint(section(root, "console", reported_before), "listen", daemon.console.listen, true,
+                 diagnostics);
   if (daemon.motion.enabled()) {
     const Node& motion = section(root, "motion", reported_before);
     check_motion(motion, daemon.motion, diagnostics);
@@ -331,6 +333,7 @@ Result<DaemonConfig> load_daemon(const std::filesystem::path& file,
   read_table(section(root, "control", diagnostics), control_keys(), daemon.control, diagnostics);
   read_table(section(root, "stream", diagnostics), stream_keys(), daemon.stream, diagnostics);
   read_table(section(root, "metrics", diagnostics), metrics_keys(), daemon.metrics, diagnostics);
+  read_table(section(root, "console", diagnostics), console_keys(), daemon.console, diagnostics);
   read_table(section(root, "access", diagnostics), access_keys(), daemon.access, diagnostics);
   read_table(section(root, "tls", diagnostics), tls_keys(), daemon.tls, diagnostics);
   read_table(section(root, "journal", diagnostics), journal_keys(), daemon.journal, diagnostics);

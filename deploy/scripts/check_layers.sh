@@ -71,7 +71,8 @@ server/agents/recorder: server/agents server/net server/rt config/include protoc
 server/agents/render: server/agents server/motion server/pacing renderer/image renderer/physics
 server/agents/motion: server/agents server/axes server/motion server/net server/rt config/include protocol renderer/physics renderer/scene
 server/agents/gateway: server/agents server/gateway server/net server/rt config/include protocol renderer/physics renderer/scene
-server/app: server/axes server/host server/agents server/agents/conductor server/agents/gateway server/gateway server/agents/motion server/agents/receiver server/agents/recorder server/agents/render server/agents/sender server/motion server/net server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
+server/console: server/agents server/agents/sender server/net server/rt server/telemetry config/include protocol renderer/image renderer/physics renderer/scene
+server/app: server/axes server/console server/host server/agents server/agents/conductor server/agents/gateway server/gateway server/agents/motion server/agents/receiver server/agents/recorder server/agents/render server/agents/sender server/motion server/net server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
 server/tool/support: server/app server/pacing server/telemetry config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene renderer/scene/generate
 server/tool/command_line: server/tool/support config/include renderer/physics
 server/tool/logger: server/tool/command_line server/tool/support config/include renderer/physics renderer/reference renderer/scene

@@ -13,9 +13,9 @@ libraries=(libepoxy-dev libegl-dev libglfw3-dev libglm-dev libtinygltf-dev libst
            libopenexr-dev libboost-dev libprotobuf-dev protobuf-compiler libspdlog-dev libfmt-dev
            libtomlplusplus-dev libcli11-dev libexpected-dev libembree-dev libtbb-dev libeigen3-dev
            libceres-dev libmeshoptimizer-dev libisal-dev liblz4-dev libssl-dev libgtest-dev libgmock-dev
-           python3-protobuf python3-numpy)
+           python3-protobuf python3-numpy node-typescript)
 runtime=(libegl-mesa0 libgl1-mesa-dri xvfb xauth)
-checkers=(clang-format clang-tidy clang libclang-rt-dev python3 tshark)
+checkers=(clang-format clang-tidy clang libclang-rt-dev python3 tshark chromium python3-websockets)
 yardsticks=(iperf3 libzmq3-dev iceoryx libiceoryx-posh-dev)
 peers=(gpsd-tools proj-bin ffmpeg)
 node_peers=(@mcap/core@2 @mcap/support@1 protobufjs@7 open-dis@1 gps@0.9)

@@ -8,6 +8,7 @@
 
 #include "agents/channel_table.hpp"
 #include "agents/messages.hpp"
+#include "agents/run_board.hpp"
 #include "emit/protocol/resend.hpp"
 #include "gateway/host_gateway.hpp"
 #include "rt/byte_ring.hpp"
@@ -67,6 +68,7 @@ struct Doorbells {
   Doorbell recorder;
   Doorbell motion;
   Doorbell gateway;
+  Doorbell console;  ///< the thread of the console, which is no agent
 };
 
 /// Objects that more than one agent uses: rings, counters and what is fixed after start.
@@ -96,6 +98,8 @@ struct Context {
   FrameTimes times;
   PredictionErrors prediction;
   MotionTimes motion_times;
+  RunBoard run;
+  AxesBoard axes;
   FrameTrace trace;
   Doorbells bells;
   std::vector<Channel> channels;             ///< fixed before the agents run
@@ -123,6 +127,8 @@ struct Context {
   SpscRing<HostInput> gateway_inputs{32};       // gateway -> conductor
   SpscRing<GatewayReport> gateway_reports{64};  // conductor -> gateway
   SpscRing<AxisFeedback> shift_feedback{1024};  // motion -> render, where pictures shift
+  SpscRing<HostInput> console_inputs{8};        // console -> conductor
+  SpscRing<StatusReply> console_replies{32};    // conductor -> console
   ByteRing journal;                             // conductor -> recorder
   SpscRing<ClientCommand> to_sender;            // receiver -> sender
   SpscRing<ClientReleased> from_sender;         // sender -> receiver
@@ -141,6 +147,7 @@ struct Context {
   EventLog sender_events{256, counters};
   EventLog recorder_events{64, counters};
   EventLog metrics_events{64, counters};
+  EventLog console_events{64, counters};
   EventLog motion_events{64, counters};
   EventLog gateway_events{64, counters};
 

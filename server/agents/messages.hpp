@@ -34,7 +34,7 @@ using protocol::StatusCode;
 
 /// Address of an answer.
 struct Origin {
-  enum class Kind : std::uint8_t { none, udp, tcp, gateway };
+  enum class Kind : std::uint8_t { none, udp, tcp, gateway, console };
   Kind kind = Kind::none;
   std::uint32_t connection = 0;  ///< tcp: index and generation in the receiver's table
   std::uint32_t generation = 0;

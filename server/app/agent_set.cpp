@@ -111,9 +111,15 @@ physics::Result<void> AgentSet::make_sender() {
     }
     shm_ = std::move(*shm);
   }
+  if (!config_.console.listen.empty()) {
+    console_tap_ = std::make_unique<ConsoleTap>(context_);
+  }
+  std::vector<SenderClient*> residents;
+  if (shm_) residents.push_back(shm_.get());
+  if (console_tap_) residents.push_back(console_tap_.get());
   const bool slotted = config_.pacing.mode != config::PacingMode::host_step;
   sender_ =
-      std::make_unique<Sender>(context_, window, config_.control.max_clients, slotted, shm_.get());
+      std::make_unique<Sender>(context_, window, config_.control.max_clients, slotted, residents);
   if (config_.stream.compression) {
     sender_->allow_compression();
   }

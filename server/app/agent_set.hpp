@@ -17,6 +17,7 @@
 #include "agents/sender/sender.hpp"
 #include "agents/sender/shm_client.hpp"
 #include "app/process_names.hpp"
+#include "console/console_tap.hpp"
 #include "emit/config/daemon_config.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/scene/scene_desc.hpp"
@@ -97,6 +98,8 @@ class AgentSet {
   [[nodiscard]] Recorder& recorder() const;
   [[nodiscard]] Sender& sender() const;
   [[nodiscard]] Conductor& conductor() const;
+  /// Returns where the console takes its images from; null: there is no console.
+  [[nodiscard]] ConsoleTap* console_tap() const noexcept { return console_tap_.get(); }
   /// Returns the gateway agent; null: there is none.
   [[nodiscard]] const GatewayAgent* gateway() const noexcept { return gateway_.get(); }
 
@@ -142,6 +145,7 @@ class AgentSet {
   std::unique_ptr<RenderAgent> render_;
   std::unique_ptr<Recorder> recorder_;
   std::unique_ptr<ShmClient> shm_;
+  std::unique_ptr<ConsoleTap> console_tap_;
   std::unique_ptr<Sender> sender_;
   std::optional<MotionPlan> motion_plan_;
   std::unique_ptr<MotionAgent> motion_;

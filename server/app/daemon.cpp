@@ -186,6 +186,27 @@ physics::Result<void> DaemonImpl::open_endpoint(const ProcessNames& names) {
     return tl::unexpected<Error>(std::move(opened.error()));
   }
   endpoint_ = std::move(*opened);
+  return open_console(names);
+}
+
+physics::Result<void> DaemonImpl::open_console(const ProcessNames& names) {
+  ConsoleTap* tap = agents_.console_tap();
+  if (tap == nullptr) {
+    return {};
+  }
+  ConsoleFacts facts{names.software, names.scenario, names.pacing, names.device};
+  const bool host_step = config_.pacing.mode == config::PacingMode::host_step;
+  facts.rate_hz = host_step ? 0.0 : config_.pacing.rate_hz;
+  facts.budget_ns = config_.pacing.budget_ns;
+  facts.image_rate_hz = config_.console.rate_hz;
+  facts.motion = config_.motion.enabled();
+  const ConsoleEndpoint::Parts parts{
+      context_, *tap, liveness_, log_.board(), agents_.receiver(), agents_.duty_cycles()};
+  auto opened = ConsoleEndpoint::open(config_, parts, std::move(facts));
+  if (!opened) {
+    return tl::unexpected<Error>(std::move(opened.error()));
+  }
+  console_ = std::move(*opened);
   return {};
 }
 
@@ -259,10 +280,11 @@ physics::Result<void> DaemonImpl::check_realtime() {
 
 std::string DaemonImpl::ready_line() const {
   const SocketAddress host = agents_.receiver().host_address();
-  return fmt::format("ready control={} host_udp={}{}{}",
+  return fmt::format("ready control={} host_udp={}{}{}{}",
                      to_string(agents_.receiver().control_address()),
                      host.length != 0 ? to_string(host) : std::string("off"),
                      triggers_ ? " trigger=" + to_string(triggers_->address()) : std::string(),
+                     console_ ? " console=" + console_->url() : std::string(),
                      endpoint_ ? " metrics=" + to_string(endpoint_->address()) : std::string());
 }
 

@@ -10,6 +10,7 @@
 
 #include "agents/context.hpp"
 #include "app/agent_set.hpp"
+#include "app/console_endpoint.hpp"
 #include "app/daemon.hpp"
 #include "app/daemon_log.hpp"
 #include "app/liveness.hpp"
@@ -29,6 +30,7 @@ class DaemonImpl final : public Daemon {
   DaemonImpl(const config::DaemonConfig& config, std::optional<scene::ScenarioDesc> scenario,
              DaemonOptions options);
   ~DaemonImpl() override {
+    console_.reset();
     endpoint_.reset();
     if (options_.stepped && agents_.is_made()) {
       agents_.drain_stepped([this] { return step(); });
@@ -73,6 +75,7 @@ class DaemonImpl final : public Daemon {
   [[nodiscard]] physics::Result<void> make_agents();
   void log_start(const ProcessNames& names);
   [[nodiscard]] physics::Result<void> open_endpoint(const ProcessNames& names);
+  [[nodiscard]] physics::Result<void> open_console(const ProcessNames& names);
   /// Runs one turn of the main thread while serving: waits up to 100 ms, then checks the agents.
   void watch_once();
   [[nodiscard]] int end_in_order();
@@ -104,6 +107,7 @@ class DaemonImpl final : public Daemon {
   std::unique_ptr<TriggerPort> triggers_;
   AgentSet agents_;
   std::unique_ptr<MetricsEndpoint> endpoint_;  ///< its thread reads all of the above
+  std::unique_ptr<ConsoleEndpoint> console_;   ///< likewise
 };
 
 }  // namespace emit::server

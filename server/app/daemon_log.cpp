@@ -182,7 +182,7 @@ void DaemonLog::take_events() {
   for (EventLog* events :
        {&context_.conductor_events, &context_.receiver_events, &context_.render_events,
         &context_.sender_events, &context_.recorder_events, &context_.metrics_events,
-        &context_.motion_events, &context_.gateway_events}) {
+        &context_.motion_events, &context_.gateway_events, &context_.console_events}) {
     while (const Event* event = events->ring().front()) {
       const EventText line = describe(*event);
       board_.note(*event);

@@ -1,38 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/metrics_endpoint.hpp"
 
-#include <fmt/format.h>
-
 #include <optional>
 #include <utility>
 
 #include "app/service_health.hpp"
 #include "net/ip_address.hpp"
+#include "telemetry/http_address.hpp"
 
 namespace emit::server {
-namespace {
-
-/// Returns the address that metrics.listen states. Errors: config, io.
-physics::Result<SocketAddress> listen_address(const config::DaemonConfig& config) {
-  const auto where = parse_host_port(config.metrics.listen);
-  if (!where) {
-    return tl::unexpected<physics::Error>(where.error());
-  }
-  auto address = resolve(*where, Transport::tcp, true);
-  if (!address) {
-    return address;
-  }
-  if (!ip_of(*address).is_loopback() && !config::is_protected(config, config::Port::metrics)) {
-    return physics::make_error(
-        physics::ErrorCode::config,
-        fmt::format("{}: other hosts may reach it: that needs {}", to_string(*address),
-                    config::protections_of(config::Port::metrics)));
-  }
-  return address;
-}
-
-}  // namespace
-
 physics::Result<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::open(
     const config::DaemonConfig& config, const Parts& parts, MetricsText::Labels build) {
   if (config.metrics.listen.empty()) {
@@ -42,7 +18,7 @@ physics::Result<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::open(
     return tl::unexpected<physics::Error>(
         std::move(error).with_context("metrics.listen").with_context(config.file.string()));
   };
-  const auto address = listen_address(config);
+  const auto address = http_address(config, config.metrics.listen, config::Port::metrics);
   if (!address) {
     return named(address.error());
   }

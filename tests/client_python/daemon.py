@@ -43,6 +43,7 @@ class Daemon:
             self.close()
             raise
         words = dict(word.split("=", 1) for word in ready.split()[1:])
+        self.console = words.get("console")
         self.control = words["control"]
         self.host_udp = words["host_udp"]
         self.metrics = words.get("metrics")

@@ -85,6 +85,9 @@ TEST_F(ConfigTest, a_port_for_other_hosts_needs_a_protection) {
   EXPECT_EQ(daemon_error(kCanned + "[metrics]\nlisten = \"rig:7002\"\n"),
             "d.toml:4:10: 'metrics.listen' is 'rig:7002', which other hosts may reach: that "
             "needs 'access.allow'");
+  EXPECT_EQ(daemon_error(kCanned + "[console]\nlisten = \"0.0.0.0:7003\"\n"),
+            "d.toml:4:10: 'console.listen' is '0.0.0.0:7003', which other hosts may reach: that "
+            "needs 'access.allow'");
 }
 
 TEST_F(ConfigTest, each_protection_covers_its_ports) {

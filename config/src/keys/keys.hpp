@@ -123,6 +123,7 @@ struct DaemonHead {
 [[nodiscard]] const KeyTable<ControlConfig>& control_keys();
 [[nodiscard]] const KeyTable<StreamConfig>& stream_keys();
 [[nodiscard]] const KeyTable<MetricsConfig>& metrics_keys();
+[[nodiscard]] const KeyTable<ConsoleConfig>& console_keys();
 [[nodiscard]] const KeyTable<AccessConfig>& access_keys();
 [[nodiscard]] const KeyTable<TlsConfig>& tls_keys();
 [[nodiscard]] const KeyTable<MotionConfig>& motion_keys();

@@ -57,8 +57,8 @@ const KeyTable<AccessConfig>& access_keys() {
   static const KeyTable<AccessConfig> keys = {
       networks(
           "allow", EMIT_FIELD(allow),
-          "Networks whose hosts may reach the control, host and metrics ports, beside loopback. "
-          "Others are dropped before a byte is read. Empty: all hosts may."),
+          "Networks whose hosts may reach the control, host, metrics and console ports, beside "
+          "loopback. Others are dropped before a byte is read. Empty: all."),
       networks("multicast_groups", EMIT_FIELD(multicast_groups),
                "Multicast groups that a client may have frames sent to. The default is the "
                "site-local scopes."),

@@ -209,6 +209,25 @@ const KeyTable<MetricsConfig>& metrics_keys() {
   return keys;
 }
 
+const KeyTable<ConsoleConfig>& console_keys() {
+  static const KeyTable<ConsoleConfig> keys = {
+      text<ConsoleConfig>("listen", EMIT_FIELD(listen),
+                          "`address:port` for HTTP, where a browser opens the console. Beyond "
+                          "loopback it needs `access.allow`. When it is empty, there is none."),
+      choice<ConsoleConfig>("commands",
+                            std::vector<std::pair<std::string, ConsoleCommands>>{
+                                {"none", ConsoleCommands::none},
+                                {"loopback", ConsoleCommands::loopback},
+                                {"all", ConsoleCommands::all}},
+                            EMIT_FIELD(commands),
+                            "Consoles that may start, stop, hold, step and reset the run: `none`, "
+                            "those on this host, or all."),
+      number<ConsoleConfig>("rate_hz", "Hz", between(0.1, 60), EMIT_FIELD(rate_hz),
+                            "Most images a second, all consoles together."),
+  };
+  return keys;
+}
+
 const KeyTable<JournalConfig>& journal_keys() {
   static const KeyTable<JournalConfig> keys = {
       path<JournalConfig>("file", EMIT_FIELD(file),

@@ -181,6 +181,7 @@ std::string print_daemon(const DaemonConfig& daemon) {
   print_section("[control]", daemon.control, control_keys(), out);
   print_section("[stream]", daemon.stream, stream_keys(), out);
   print_section("[metrics]", daemon.metrics, metrics_keys(), out);
+  print_section("[console]", daemon.console, console_keys(), out);
   print_section("[access]", daemon.access, access_keys(), out);
   print_section("[tls]", daemon.tls, tls_keys(), out);
   print_section("[journal]", daemon.journal, journal_keys(), out);

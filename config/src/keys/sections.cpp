@@ -118,6 +118,9 @@ const std::vector<SectionDoc>& daemon_sections() {
                   ControlConfig{}),
       section_doc("stream", false, "Output of frames.", stream_keys(), StreamConfig{}),
       section_doc("metrics", false, "Numbers for monitoring.", metrics_keys(), MetricsConfig{}),
+      section_doc("console", false,
+                  "The operator's console in a browser ([console.md](../server/docs/console.md)).",
+                  console_keys(), ConsoleConfig{}),
       section_doc("access", false,
                   "Hosts that may connect. emitd does not start with a port that other hosts reach "
                   "unless it is protected: by `allow`, for `control.tcp` also by `[tls]`, for "

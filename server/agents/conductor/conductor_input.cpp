@@ -17,7 +17,7 @@ int Conductor::take_inputs(std::int64_t now_ns) noexcept {
   if (from_gateway > 0 && context_.of_gateway_room.end()) {
     context_.bells.gateway.ring();
   }
-  return work + from_gateway;
+  return work + from_gateway + take_inputs(context_.console_inputs, now_ns);
 }
 
 int Conductor::take_inputs(SpscRing<HostInput>& inputs, std::int64_t now_ns) noexcept {
@@ -219,6 +219,8 @@ bool Conductor::take_command(const HostInput& input, std::int64_t now_ns) noexce
     return true;
   }
   journal_.command(command, now_ns);
+  context_.run.running.store(control_.running(), std::memory_order_relaxed);
+  context_.run.held.store(control_.held(), std::memory_order_relaxed);
   if (command == CommandKind::reset) {
     gate_.reset();
     if (slots_) {
@@ -258,6 +260,14 @@ void Conductor::reply(const Origin& origin, StatusCode code, std::uint64_t host_
   }
   if (origin.kind == Origin::Kind::gateway) {
     report_input(code, host_frame_number, detail);
+    return;
+  }
+  if (origin.kind == Origin::Kind::console) {
+    // One that its console does not take in time is missed by the eye alone.
+    if (!context_.console_replies.push({origin, code, host_frame_number, count, detail})) {
+      context_.counters.add(Counter::statuses_suppressed);
+    }
+    context_.bells.console.ring();
     return;
   }
   if (!context_.replies.push({origin, code, host_frame_number, count, detail})) {

@@ -69,13 +69,16 @@ int MotionAgent::take_monitors(std::int64_t now_ns) noexcept {
       context_.motion_times.error.record(follower_.error_rad());
     }
     report(&*feedback);
+    show(*feedback);
   }
   return work;
 }
 
 void MotionAgent::command(std::int64_t now_ns) noexcept {
   context_.motion_times.late.record(now_ns - due_ns_);
-  link_->send(follower_.step(now_ns), now_ns);
+  const protocol::AxesCommand& command = follower_.step(now_ns);
+  link_->send(command, now_ns);
+  show(command);
   // Commands that are due already are left out: the axes need the newest one alone.
   const std::int64_t missed = (now_ns - due_ns_) / period_ns_;
   if (missed > 0) {
@@ -85,8 +88,30 @@ void MotionAgent::command(std::int64_t now_ns) noexcept {
   note_status();
 }
 
+void MotionAgent::show(const protocol::AxesCommand& command) noexcept {
+  AxesBoard& board = context_.axes;
+  for (std::size_t i = 0; i < command.count; ++i) {
+    board.commanded_rad[i].store(command.axes[i].angle_rad, std::memory_order_relaxed);
+  }
+  if (command.count > 0) board.count.store(command.count, std::memory_order_relaxed);
+}
+
+void MotionAgent::show(const AxisFeedback& feedback) noexcept {
+  AxesBoard& board = context_.axes;
+  const TableAngles& angles = feedback.angles;
+  const std::array<double, protocol::kMaxAxes> measured{angles.unit_rad.x, angles.unit_rad.y,
+                                                        angles.unit_rad.z, angles.target_rad.x,
+                                                        angles.target_rad.y};
+  for (std::size_t i = 0; i < measured.size(); ++i) {
+    board.measured_rad[i].store(measured[i], std::memory_order_relaxed);
+  }
+  board.measured_ns.store(feedback.time_ns, std::memory_order_relaxed);
+}
+
 void MotionAgent::note_status() noexcept {
   const TableFollower::Status& now = follower_.status();
+  context_.axes.state.store(static_cast<std::uint8_t>(now.state), std::memory_order_relaxed);
+  context_.axes.faults.store(now.faults, std::memory_order_relaxed);
   const bool changed = now.state != known_.state || now.faults != known_.faults;
   // Limits and locks come and go with every manoeuvre: they are counted, not logged.
   constexpr unsigned kCounted = protocol::kMotionLimit | protocol::kMotionLock;

@@ -36,6 +36,9 @@ class MotionAgent final : public Agent {
   int take_poses(std::int64_t now_ns) noexcept;
   int take_monitors(std::int64_t now_ns) noexcept;
   void command(std::int64_t now_ns) noexcept;
+  /// Shows the newest command, or measurement, to whoever displays the axes.
+  void show(const protocol::AxesCommand& command) noexcept;
+  void show(const AxisFeedback& feedback) noexcept;
   void report(const AxisFeedback* feedback) noexcept;
   /// Counts and logs what has begun or ended since the latest command.
   void note_status() noexcept;

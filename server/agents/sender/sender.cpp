@@ -5,22 +5,23 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 namespace emit::server {
 
 Sender::Sender(Context& context, std::uint32_t queue_frames, std::size_t max_clients,
-               bool keep_last, SenderClient* resident)
+               bool keep_last, std::vector<SenderClient*> residents)
     : Agent(context.bells.sender),
       context_(context),
       queue_frames_(std::max(queue_frames, 1U)),
       keep_last_(keep_last),
-      resident_(resident),
+      residents_(std::move(residents)),
       epoll_(::epoll_create1(EPOLL_CLOEXEC)),
       window_(queue_frames_ + 1) {
-  clients_.reserve(max_clients + 1);
-  if (resident_ != nullptr) {
-    resident_->next = end_;
-    clients_.push_back(resident_);
+  clients_.reserve(max_clients + residents_.size());
+  for (SenderClient* resident : residents_) {
+    resident->next = end_;
+    clients_.push_back(resident);
   }
 }
 
@@ -133,6 +134,7 @@ int Sender::take_published() noexcept {
     ++end_;
     ++taken_;
     for (SenderClient* client : clients_) {
+      client->see(added.header);
       pass_over_unwanted(*client);
     }
     context_.published.pop();
@@ -155,7 +157,7 @@ void Sender::evict_oldest() noexcept {
     SenderClient& client = *clients_[i];
     if (client.busy() && !client.spilled() && client.in_transit == first_) {
       client.spill();
-      context_.counters.add(Counter::frames_spilled);
+      if (client.is_stream()) context_.counters.add(Counter::frames_spilled);
     }
     if (client.next == first_) {
       if (client.every_frame()) {
@@ -173,10 +175,16 @@ void Sender::evict_oldest() noexcept {
 }
 
 void Sender::count_skipped(const SenderClient& client) noexcept {
+  if (!client.is_stream()) return;
   context_.counters.add(Counter::frames_skipped);
   if (ClientCounts* counts = counts_of(client)) {
     counts->skipped.fetch_add(1, std::memory_order_relaxed);
   }
+}
+
+bool Sender::has_several_streams() const noexcept {
+  return std::ranges::count_if(clients_,
+                               [](const SenderClient* client) { return client->is_stream(); }) > 1;
 }
 
 void Sender::drop_oldest() noexcept {
@@ -196,9 +204,8 @@ void Sender::pass_over_unwanted(SenderClient& client) noexcept {
     if (client.misses(next.header, next.image.channels)) {
       client.gap = true;
       count_skipped(client);
-    } else {
-      context_.counters.add(&client == resident_ ? Counter::frames_unread
-                                                 : Counter::frames_left_out);
+    } else if (client.is_stream()) {
+      context_.counters.add(client.counter_of_unwanted());
     }
   }
 }
@@ -294,7 +301,7 @@ bool Sender::advance(SenderClient& client) noexcept {
   if (!client.busy() && client.next < end_) {
     // The other clients begin at about this time. A brief turn keeps their first bytes from
     // waiting.
-    turn = clients_.size() > 1 ? SenderClient::Turn::brief : turn;
+    turn = has_several_streams() ? SenderClient::Turn::brief : turn;
     client.next = std::max(client.next, first_);
     const Entry& next = entry(client.next);
     client.in_transit = client.next++;
@@ -336,6 +343,7 @@ ClientCounts* Sender::counts_of(const SenderClient& client) const noexcept {
 void Sender::account(SenderClient& client) noexcept {
   const std::int64_t now_ns = context_.clock.tai_ns();
   client.complete(now_ns);
+  if (!client.is_stream()) return;
   context_.counters.add(Counter::frames_sent);
   context_.times.send.record(now_ns - client.header().send_start_ns);
   ClientCounts* counts = counts_of(client);
@@ -375,7 +383,7 @@ void Sender::remove(std::size_t index, bool failed) noexcept {
     ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, client->fd(), nullptr);
   }
   clients_.erase(clients_.begin() + static_cast<std::ptrdiff_t>(index));
-  if (client == resident_) {
+  if (std::ranges::find(residents_, client) != residents_.end()) {
     return;
   }
   if (failed && client->error() != 0) {

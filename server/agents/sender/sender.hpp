@@ -26,10 +26,10 @@ namespace emit::server {
 class Sender final : public Agent {
  public:
   /// Creates the sender. `keep_last` retains the newest image, because it may have to be sent again
-  /// (ig-clock). `resident` is a client that is served from start to end and belongs to no
-  /// connection, or null.
+  /// (ig-clock). `residents` are clients that are served from start to end and belong to no
+  /// connection.
   Sender(Context& context, std::uint32_t queue_frames, std::size_t max_clients, bool keep_last,
-         SenderClient* resident = nullptr);
+         std::vector<SenderClient*> residents = {});
 
   /// Takes the memory to compress for clients that want it. The images are fixed by then. Do not
   /// call it while the agent runs.
@@ -74,6 +74,8 @@ class Sender final : public Agent {
   [[nodiscard]] ClientCounts* counts_of(const SenderClient& client) const noexcept;
   void account(SenderClient& client) noexcept;
   void count_skipped(const SenderClient& client) noexcept;
+  /// Returns whether more than one client gets every frame.
+  [[nodiscard]] bool has_several_streams() const noexcept;
   void evict_oldest() noexcept;
   void drop_oldest() noexcept;
   void trim() noexcept;
@@ -88,7 +90,7 @@ class Sender final : public Agent {
   Context& context_;
   const std::uint32_t queue_frames_;
   const bool keep_last_;
-  SenderClient* const resident_;
+  const std::vector<SenderClient*> residents_;
   Fd epoll_;
   UdpBatch batch_;
   std::vector<SenderClient*> clients_;  // reserved at start

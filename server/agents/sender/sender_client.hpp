@@ -53,6 +53,15 @@ class SenderClient {
   [[nodiscard]] virtual bool ask_again(const protocol::ResendRequest& /*request*/) noexcept {
     return false;
   }
+  /// Returns true for a receiver of every frame that it wants. False: it looks at a frame now and
+  /// then, its frames are in no count and no time, and no other client's turn gets shorter for it.
+  [[nodiscard]] virtual bool is_stream() const noexcept { return true; }
+  /// Returns the counter of frames that it does not want.
+  [[nodiscard]] virtual Counter counter_of_unwanted() const noexcept {
+    return Counter::frames_left_out;
+  }
+  /// Takes notice of a published frame, wanted or not.
+  virtual void see(const protocol::FrameHeader& /*header*/) noexcept {}
   /// Notes that the frame leaves the window: its pixels must not be touched any more.
   virtual void forget(std::uint64_t /*sequence*/) noexcept {}
 

@@ -32,6 +32,9 @@ class ShmClient final : public SenderClient {
   /// Copies the rest at once, so that the source waits for no more than that.
   void spill() noexcept override;
   [[nodiscard]] std::uint32_t connection() const noexcept override { return 0; }
+  [[nodiscard]] Counter counter_of_unwanted() const noexcept override {
+    return Counter::frames_unread;
+  }
   /// Returns false while nobody reads, so that nothing is copied then.
   [[nodiscard]] bool wants(const protocol::FrameHeader& /*header*/,
                            ChannelSet /*channels*/) const noexcept override {

@@ -4,8 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <system_error>
 
 #include "emit/image/png_image.hpp"
@@ -13,16 +11,9 @@
 #include "emit/protocol/frame_header.hpp"
 
 namespace emit::tool {
-namespace {
 
 using physics::ErrorCode;
 using physics::make_error;
-
-constexpr double kTableFromK = 150.0;
-constexpr double kTableToK = 1500.0;
-constexpr double kTableStepK = 0.05;
-
-}  // namespace
 
 physics::Band spectral_band(const scene::SpectralBand& band) {
   return {band.lo_um, band.hi_um, response_of(band)};
@@ -49,59 +40,6 @@ std::string conversion_text(const physics::Band& band, bool response_known) {
     return fmt::format("{} by its response of {} points", limits, band.response.size());
   }
   return limits + (response_known ? ", a rectangle" : ", response not known: a rectangle assumed");
-}
-
-ApparentTemperature::ApparentTemperature(double lo_um, double hi_um)
-    : ApparentTemperature(physics::Band{lo_um, hi_um, {}}) {}
-
-ApparentTemperature::ApparentTemperature(const physics::Band& band) {
-  EMIT_CHECK(physics::validate(band).has_value());
-  // The table is exact every 2 K. In between ln L is linear in 1/T, with an error below 1 mK in the
-  // thermal bands.
-  constexpr double kAnchorK = 2.0;
-  const auto count = static_cast<std::size_t>((kTableToK - kTableFromK) / kTableStepK) + 1;
-  radiance_.reserve(count);
-  double anchor_k = kTableFromK;
-  double log_low = physics::band_radiance(band, physics::Kelvin{anchor_k}).log_radiance;
-  double log_high = physics::band_radiance(band, physics::Kelvin{anchor_k + kAnchorK}).log_radiance;
-  for (std::size_t i = 0; i < count; ++i) {
-    const double t_k = kTableFromK + kTableStepK * static_cast<double>(i);
-    while (t_k > anchor_k + kAnchorK) {
-      anchor_k += kAnchorK;
-      log_low = log_high;
-      log_high = physics::band_radiance(band, physics::Kelvin{anchor_k + kAnchorK}).log_radiance;
-    }
-    const double fraction =
-        (1.0 / anchor_k - 1.0 / t_k) / (1.0 / anchor_k - 1.0 / (anchor_k + kAnchorK));
-    radiance_.push_back(std::exp(log_low + (log_high - log_low) * fraction));
-  }
-}
-
-std::size_t ApparentTemperature::interval(double radiance_w_m2_sr) const noexcept {
-  const auto above = std::upper_bound(radiance_.begin(), radiance_.end(), radiance_w_m2_sr);
-  const auto index = above - radiance_.begin();
-  return static_cast<std::size_t>(
-      std::clamp<std::ptrdiff_t>(index, 1, static_cast<std::ptrdiff_t>(radiance_.size()) - 1) - 1);
-}
-
-double ApparentTemperature::kelvin(double radiance_w_m2_sr) const noexcept {
-  if (std::isnan(radiance_w_m2_sr)) return std::numeric_limits<double>::quiet_NaN();
-  const std::size_t i = interval(radiance_w_m2_sr);
-  const double fraction = (radiance_w_m2_sr - radiance_[i]) / (radiance_[i + 1] - radiance_[i]);
-  return kTableFromK + kTableStepK * (static_cast<double>(i) + std::clamp(fraction, 0.0, 1.0));
-}
-
-double ApparentTemperature::kelvin_per_radiance(double radiance_w_m2_sr) const noexcept {
-  const std::size_t i = interval(radiance_w_m2_sr);
-  return kTableStepK / (radiance_[i + 1] - radiance_[i]);
-}
-
-std::vector<float> ApparentTemperature::kelvin(std::span<const float> radiance_w_m2_sr) const {
-  std::vector<float> out(radiance_w_m2_sr.size());
-  std::transform(
-      radiance_w_m2_sr.begin(), radiance_w_m2_sr.end(), out.begin(),
-      [this](float value) { return static_cast<float>(kelvin(static_cast<double>(value))); });
-  return out;
 }
 
 std::string output_text(std::uint8_t output_steps) {

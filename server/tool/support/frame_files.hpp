@@ -11,32 +11,14 @@
 
 #include "emit/image/exr_image.hpp"
 #include "emit/image/false_color.hpp"
+#include "emit/image/temperature_table.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/physics/planck.hpp"
 #include "emit/scene/scene_desc.hpp"
 
 namespace emit::tool {
 
-/// Converts in-band radiance to the temperature of a blackbody of the same radiance. It uses a
-/// table of 0.05 K steps over 150..1500 K; a radiance outside gets the end of the table.
-/// Construction: setup only. Lookup: any thread.
-class ApparentTemperature {
- public:
-  /// Makes the table of a band with its response.
-  /// @pre physics::validate(band) succeeds
-  explicit ApparentTemperature(const physics::Band& band);
-  /// Makes the table of a rectangular band.
-  /// @pre 0 < lo_um < hi_um
-  ApparentTemperature(double lo_um, double hi_um);
-  [[nodiscard]] double kelvin(double radiance_w_m2_sr) const noexcept;
-  /// Returns dT/dL at that radiance, K per W m-2 sr-1.
-  [[nodiscard]] double kelvin_per_radiance(double radiance_w_m2_sr) const noexcept;
-  [[nodiscard]] std::vector<float> kelvin(std::span<const float> radiance_w_m2_sr) const;
-
- private:
-  [[nodiscard]] std::size_t interval(double radiance_w_m2_sr) const noexcept;
-  std::vector<double> radiance_;  ///< ascending
-};
+using ApparentTemperature = image::TemperatureTable;
 
 /// Returns the scenario's band in the form of the radiometry, response included.
 [[nodiscard]] physics::Band spectral_band(const scene::SpectralBand& band);

@@ -60,7 +60,7 @@ TEST(SteadyState, NoAgentOnTheFramePathAllocates) {
   ASSERT_TRUE(shm.has_value()) << shm.error().text;
   const auto reader = ShmObject::open(stream.shm);  // or nothing would be copied
   ASSERT_TRUE(reader.has_value()) << reader.error().text;
-  Sender sender(context, 4, 4, false, shm->get());
+  Sender sender(context, 4, 4, false, {shm->get()});
   ASSERT_TRUE(sender.on_start());
 
   int pair[2] = {-1, -1};

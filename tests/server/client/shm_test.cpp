@@ -515,7 +515,7 @@ TEST(Shm, TheSenderServesItAndKeepsItToItself) {
   test::SourceScript script;
   constexpr std::uint32_t kQueue = 4;
   test::ScriptedSource source(script, kWidthPx, kHeightPx, kQueue + 3);
-  Sender sender(context, kQueue, 4, false, shm->get());
+  Sender sender(context, kQueue, 4, false, {shm->get()});
   ASSERT_TRUE(sender.on_start());
   std::unique_ptr<client::FrameClient> reader;
   constexpr std::uint64_t kUnread = 10;  // nobody reads so long

@@ -199,6 +199,16 @@ struct MetricsConfig {
   std::string listen;  ///< address:port of the HTTP server; empty: off
 };
 
+/// Peers whose consoles may start, stop, hold, step and reset the run.
+enum class ConsoleCommands : std::uint8_t { none, loopback, all };
+
+/// Console of the operator: a page in a browser.
+struct ConsoleConfig {
+  std::string listen;  ///< address:port of its HTTP server; empty: off
+  ConsoleCommands commands = ConsoleCommands::loopback;
+  double rate_hz = 10.0;  ///< most images a second, all consoles together
+};
+
 /// Hosts that may connect, beside this one.
 struct AccessConfig {
   std::vector<protocol::Network> allow;  ///< empty: every host
@@ -254,6 +264,7 @@ struct DaemonConfig {
   ControlConfig control;
   StreamConfig stream;
   MetricsConfig metrics;
+  ConsoleConfig console;
   AccessConfig access;
   TlsConfig tls;
   JournalConfig journal;
@@ -271,7 +282,7 @@ struct DaemonConfig {
 };
 
 /// A listening port of the daemon.
-enum class Port : std::uint8_t { control, host, metrics, gateway };
+enum class Port : std::uint8_t { control, host, metrics, console, gateway };
 /// True when something protects this port, so that other hosts may reach it.
 [[nodiscard]] bool is_protected(const DaemonConfig& daemon, Port port) noexcept;
 /// Keys that protect such a port, for messages.
