@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
+#include "surface/heat/column_system.hpp"
 #include "surface/heat/sample_heat.hpp"
 #include "surface/heat/surface_node.hpp"
-#include "surface/heat/column_system.hpp"
 #include "threads/worker_pool.hpp"
 
 namespace emit::renderer {

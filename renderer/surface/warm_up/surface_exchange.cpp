@@ -10,10 +10,10 @@
 
 #include "emit/physics/check.hpp"
 #include "emit/threads/parallel.hpp"
+#include "surface/heat/column_system.hpp"
 #include "surface/mesh/sheet_sides.hpp"
 #include "surface/model/entity_exitance.hpp"
 #include "surface/warm_up/body_courses.hpp"
-#include "surface/heat/column_system.hpp"
 #include "surface/warm_up/fixed_point_mixer.hpp"
 
 namespace emit::renderer {

@@ -138,8 +138,9 @@ TEST(ShellCompletion, zsh_and_fish_have_every_command_and_option_that_bash_has) 
   }
   EXPECT_NE(zsh.find("'*--channel=["), std::string::npos);
   EXPECT_NE(zsh.find(":(temperature depth object coverage)'"), std::string::npos);
-  EXPECT_NE(fish.find("'__emit_at emit render' -l channel -r -f -a 'temperature depth object coverage'"),
-            std::string::npos);
+  EXPECT_NE(
+      fish.find("'__emit_at emit render' -l channel -r -f -a 'temperature depth object coverage'"),
+      std::string::npos);
 }
 
 TEST(ShellCompletion, zsh_and_fish_take_their_scripts) {
