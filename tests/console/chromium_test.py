@@ -89,7 +89,7 @@ class Console(unittest.TestCase):
     def test_a_command_changes_the_run(self):
         with start(IG_CLOCK) as daemon:
             self.open(daemon)
-            self.page.wait_for("document.querySelector('#state').textContent === 'running'", PATIENCE_S)
+            self.page.wait_for(f"{SHOWN} > 0", PATIENCE_S)  # the run goes on
             self.page.press("h")
             self.page.wait_for("document.querySelector('#state').textContent === 'held'", PATIENCE_S)
             self.page.press("x")

@@ -121,9 +121,12 @@ class Commands(unittest.TestCase):
     def test_take_the_way_of_a_hosts(self):
         with start(IG_CLOCK) as daemon, Page(address_of(daemon)) as page:
             self.assertTrue(page.next()["may_command"])
+            page.say("next 0")
+            page.next_image()  # the run goes on
             answer = page.answer("step")
             self.assertFalse(answer["ok"], "a run that goes on has no steps")
-            self.assertTrue(page.answer("hold")["ok"])
+            answer = page.answer("hold")
+            self.assertTrue(answer["ok"], answer)
             page.next_that(lambda message: message["type"] == "status" and message["held"])
             self.assertTrue(page.answer("stop")["ok"])
             page.next_that(lambda message: message["type"] == "status" and not message["running"])
