@@ -268,7 +268,6 @@ ViewShares ViewSampler::shares(const CasterRays& casters, const ViewPoint& point
   const glm::vec3 start_m = point.position_m + point.offset_m * (point.normal + point.inward);
   std::uint32_t sky = 0;
   std::uint32_t far = 0;
-  std::uint32_t upward = 0;
   glm::vec3 to_sky(0.0F);
   for (std::size_t begin = 0; begin < directions_.size(); begin += kPacket) {
     std::array<CasterRay, kPacket> rays;
@@ -277,25 +276,21 @@ ViewShares ViewSampler::shares(const CasterRays& casters, const ViewPoint& point
     }
     const std::uint32_t blocked = open ? 0U : casters.blocked(rays, selection);
     for (std::size_t i = 0; i < kPacket; ++i) {
-      const bool up = rays[i].direction.z >= 0.0F;
-      if (up) ++upward;
       if (((blocked >> i) & 1U) != 0U) continue;
       // Sum the derivative of the cosine weight with the rays that see sky.
+      const bool up = rays[i].direction.z >= 0.0F;
       ++(up ? sky : far);
       if (up) to_sky += rays[i].direction / directions_[begin + i].z;
     }
   }
-  // The share of the hemisphere above the horizon is known exactly; rays say how much of it is
-  // open.
-  const auto count = static_cast<std::uint32_t>(directions_.size());
-  const float up_frac = std::clamp(0.5F + 0.5F * point.normal.z, 0.0F, 1.0F);
-  const auto part = [](float whole_frac, std::uint32_t open_rays, std::uint32_t all_rays) {
-    return all_rays == 0
-               ? 0.0F
-               : whole_frac * static_cast<float>(open_rays) / static_cast<float>(all_rays);
-  };
-  return {part(up_frac, sky, upward), part(1.0F - up_frac, far, count - upward),
-          to_sky / static_cast<float>(count)};
+  const float weight_frac = 1.0F / static_cast<float>(directions_.size());
+  // The share of the sky of a free face is known exactly.
+  if (sky + far == directions_.size()) {
+    const float up_frac = std::clamp(0.5F + 0.5F * point.normal.z, 0.0F, 1.0F);
+    return {up_frac, 1.0F - up_frac, weight_frac * to_sky};
+  }
+  return {static_cast<float>(sky) * weight_frac, static_cast<float>(far) * weight_frac,
+          weight_frac * to_sky};
 }
 
 ViewOpening ViewSampler::opening(const CasterRays& casters, const ViewPoint& point,

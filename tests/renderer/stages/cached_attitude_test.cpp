@@ -136,7 +136,8 @@ class RendererCachedAttitude : public testing::TestWithParam<Turn> {};
 TEST_P(RendererCachedAttitude, ABodyThatTurnedLooksLikeOneThatStartedSo) {
   const TurnError found = turn_error(slab(), GetParam().before, GetParam().after);
   EXPECT_GT(found.pixels, 200U);
-  // Eq. 26 leaves out odd harmonics of the sky from the third on.
+  // The slab reflects nine tenths. One that started so shows the ground with its own temperature,
+  // and one that moved shows surroundings in its place.
   EXPECT_LT(found.most_k, 0.7);
 }
 

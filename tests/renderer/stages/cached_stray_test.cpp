@@ -104,7 +104,9 @@ TEST(RendererStray, ACountryAroundTheSceneLeavesItsShadowsAlone) {
   const Difference off = difference(near.frame_k, wide.frame_k);
   RecordProperty("max_mk", static_cast<int>(1e3 * off.max_k));
   EXPECT_LT(off.p99_k, 0.05);
-  EXPECT_LT(off.max_k, 0.8);  // at the edge of a shadow
+  // One pixel lies at the edge of the moving shadow; without gusts, which let the ground answer
+  // faster, it was below 0.5 K.
+  EXPECT_LT(off.max_k, 0.8);
 }
 
 TEST(RendererStray, AnEntityShadesItselfWhereverItStands) {
