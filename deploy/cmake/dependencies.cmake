@@ -25,8 +25,10 @@ pkg_check_modules(lz4 REQUIRED IMPORTED_TARGET liblz4)
 pkg_check_modules(tomlplusplus REQUIRED IMPORTED_TARGET tomlplusplus)
 
 # Optional: libzmq3-dev and libiceoryx-posh-dev, yardsticks of `emit bench stream`.
-pkg_check_modules(zeromq QUIET IMPORTED_TARGET libzmq)
-find_package(iceoryx_posh QUIET)
+if(EMIT_YARDSTICKS)
+  pkg_check_modules(zeromq QUIET IMPORTED_TARGET libzmq)
+  find_package(iceoryx_posh QUIET)
+endif()
 
 # Header-only packages without a usable config file.
 find_path(EMIT_TINYGLTF_DIR tiny_gltf.h REQUIRED)
