@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gl/egl_context.hpp"
 
+#include <dlfcn.h>
 #include <epoxy/egl.h>
 #include <epoxy/gl.h>
 #include <fmt/format.h>
@@ -15,6 +16,17 @@ namespace {
 
 using physics::ErrorCode;
 using physics::make_error;
+
+/// Returns why a library that libepoxy needs cannot be opened; empty: all are there. libepoxy would
+/// end the process. A library that opens stays open, as it does in libepoxy.
+std::string missing_library() {
+  const auto opens = [](const char* name) {
+    return ::dlopen(name, RTLD_LAZY | RTLD_LOCAL) != nullptr;
+  };
+  if (!opens("libEGL.so.1")) return ::dlerror();
+  if (!opens("libGL.so.1") && !opens("libOpenGL.so.0")) return ::dlerror();
+  return {};
+}
 
 bool has_extension(const char* list, std::string_view name) {
   if (list == nullptr) return false;
@@ -150,6 +162,7 @@ struct EglContext::Impl {
 
 EglContext::EglContext(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 int EglContext::device_count() {
+  if (!missing_library().empty()) return 0;
   EGLint count = 0;
   if (!lists_devices(eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS)) ||
       eglQueryDevicesEXT(0, nullptr, &count) != EGL_TRUE) {
@@ -163,8 +176,10 @@ EglContext::EglContext(EglContext&&) noexcept = default;
 EglContext& EglContext::operator=(EglContext&&) noexcept = default;
 
 physics::Result<EglContext> EglContext::create(int gpu_index, bool debug) {
-  std::string tried;
-  for (const Candidate& candidate : list_candidates(gpu_index, tried)) {
+  std::string tried = missing_library();
+  std::vector<Candidate> candidates;
+  if (tried.empty()) candidates = list_candidates(gpu_index, tried);
+  for (const Candidate& candidate : candidates) {
     std::string why;
     const EGLContext context = make_context(candidate.display, debug, why);
     if (context == EGL_NO_CONTEXT) {
@@ -185,10 +200,11 @@ physics::Result<EglContext> EglContext::create(int gpu_index, bool debug) {
     if (impl->software) impl->threads = threads::SoftwareThreads::find();
     return EglContext(std::move(impl));
   }
-  return make_error(ErrorCode::gpu,
-                    fmt::format("no OpenGL 4.5 device: {}. Install a GPU driver with EGL, or Mesa "
-                                "(packages libegl-mesa0, libgl1-mesa-dri) for software rendering",
-                                tried));
+  return make_error(
+      ErrorCode::gpu,
+      fmt::format("no OpenGL 4.5 device: {}. Install a GPU driver with EGL, or Mesa "
+                  "(packages libegl1, libopengl0, libgl1-mesa-dri) for software rendering",
+                  tried));
 }
 
 const std::string& EglContext::device_name() const noexcept {

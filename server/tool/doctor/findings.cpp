@@ -45,8 +45,9 @@ void judge_graphics(const MachineFacts& facts, Report& report) {
       facts.graphics,
       [](const renderer::GraphicsDevice& device) { return device.usable && !device.software; });
   if (facts.graphics.empty()) {
-    report.fail("EGL device", "none",
-                "a GPU's driver with EGL, or Mesa: apt-get install libegl1 libgl1-mesa-dri");
+    report.fail(
+        "EGL device", "none",
+        "a GPU's driver with EGL, or Mesa: apt-get install libegl1 libopengl0 libgl1-mesa-dri");
   }
   for (std::size_t i = 0; i < facts.graphics.size(); ++i) {
     const renderer::GraphicsDevice& device = facts.graphics[i];
