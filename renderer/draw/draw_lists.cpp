@@ -289,7 +289,8 @@ std::span<const TargetWindow> DrawLists::find_targets(const ViewVolume& view,
   }
   // Take those that are small, and list what each window shows.
   std::size_t targets = 0;
-  for (std::size_t m = 0; m < windows_.size() && targets < EMIT_MAX_TARGETS; ++m) {
+  plain_targets_ = 0;
+  for (std::size_t m = 0; m < windows_.size(); ++m) {
     TargetWindow window = windows_[m];
     const glm::dvec2 extent_px = window.size_px();
     const double longer_px = std::max(extent_px.x, extent_px.y);
@@ -298,7 +299,10 @@ std::span<const TargetWindow> DrawLists::find_targets(const ViewVolume& view,
                         window.first_px.x < size_px.x && window.first_px.y < size_px.y;
     if (!small || !inside) continue;
     window.samples = glm::uvec2(window_samples(longer_px));
-    if (!cull_window(window, view, size_px, limits)) continue;
+    if (targets == EMIT_MAX_TARGETS || !cull_window(window, view, size_px, limits)) {
+      ++plain_targets_;
+      continue;
+    }
     windows_[targets++] = window;
   }
   // Leave them out of the image.

@@ -55,10 +55,12 @@ class DrawLists {
   /// Finds the entities whose image is at most `limit_px` wide and high in an output image of
   /// `size_px`, and lists the draws of a window for each, at the levels of detail of full quality
   /// in its samples. cull_view() then leaves these entities out. Of more than EMIT_MAX_TARGETS, or
-  /// where the memory of the lists is used up, the rest stays in the image. The result is valid
-  /// until the next begin().
+  /// where the memory of the lists is used up, the rest stays in the image; plain_targets() counts
+  /// them. The result is valid until the next begin().
   std::span<const TargetWindow> find_targets(const ViewVolume& view, const glm::uvec2& size_px,
                                              double limit_px, const LevelLimits& limits) noexcept;
+  /// Returns the number of small entities in the image that got no window from find_targets().
+  [[nodiscard]] std::uint32_t plain_targets() const noexcept { return plain_targets_; }
   /// Lists the draws of the camera into an image of `size_px`, at the levels of detail that keep to
   /// `limits`. Single-sided and double-sided draws are separate parts of view_draws().
   void cull_view(const ViewVolume& view, const LevelLimits& limits, const glm::uvec2& size_px,
@@ -147,6 +149,7 @@ class DrawLists {
   std::vector<Placed> light_placed_;   ///< one per instance, for the shadow passes that follow
   std::vector<EntityAnchor> anchors_;  ///< by entity, or empty
   std::vector<EntityStand> stands_;    ///< by entity, at the instant of the frame
+  std::uint32_t plain_targets_ = 0;
   std::vector<TargetWindow> windows_;  ///< by entity; find_targets() moves the targets to the front
   std::vector<std::uint32_t> near_window_;  ///< instances that a window may show
   std::size_t window_ranges_ = 0;           ///< entries of view_ranges_ that windows may use

@@ -576,6 +576,7 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
   prepare(request, level);
   view.stats.coarse = stage_->coarse_from(request.sensor_pose) || view.stats.rewarm_s > 0.0 ||
                       is_beyond_sensor(fov_of(request));
+  view.stats.plain_targets = passes_.targets ? stage_->drawn().lists.plain_targets() : 0;
   bind_frame();
   // Clear the counters, then issue all passes and the read-back.
   const std::uint32_t zero = 0;

@@ -56,6 +56,7 @@ struct Picture {
   std::vector<float> depth_m;
   std::vector<float> object;
   std::vector<float> coverage_frac;
+  std::uint32_t plain_targets = 0;
 };
 
 /// Renderer of ground, other static quads and plates, which are entities 1, 2, ... Each plate is a
@@ -121,7 +122,7 @@ class Sky {
       return std::vector<float>(plane.begin(), plane.end());
     };
     Picture out{copy(view.radiance_w_m2_sr[0]), copy(view.temperature_k), copy(view.depth_m),
-                copy(view.object_id), copy(view.coverage_frac)};
+                copy(view.object_id), copy(view.coverage_frac), view.stats.plain_targets};
     renderer_->release(static_cast<renderer::SlotIndex>(slot));
     return out;
   }
@@ -190,6 +191,26 @@ TEST(SmallTarget, LiesWhereItIs) {
     changed += std::abs(with.radiance[i] - without.radiance[i]) > 1e-3 ? 1U : 0U;
   }
   EXPECT_EQ(changed, 2U);
+}
+
+TEST(SmallTarget, ThoseWithoutAWindowAreCounted) {
+  // Each plate lies on a pixel's corner, so it is lost without a window.
+  std::vector<Plate> plates;
+  for (int i = 0; i < 40; ++i) {
+    plates.push_back({.side_px = 0.4, .at_px = {3.0 * (i % 8 - 4), 3.0 * (i / 8 - 2)}});
+  }
+  Sky sky(plates);
+  EXPECT_EQ(sky.show(plates).plain_targets, 8U);
+  for (std::size_t i = 32; i < plates.size(); ++i) plates[i].on = false;
+  const Picture fewer = sky.show(plates);
+  EXPECT_EQ(fewer.plain_targets, 0U);
+  EXPECT_NEAR(sky.energy(plates), 32.0 * plates[20].energy(), 0.01 * 32.0 * plates[20].energy());
+  // What is not in the image needs no window.
+  for (std::size_t i = 32; i < plates.size(); ++i) {
+    plates[i].on = true;
+    plates[i].at_px.y = 3.0 * kHeight;
+  }
+  EXPECT_EQ(sky.show(plates).plain_targets, 0U);
 }
 
 TEST(SmallTarget, NeighboursInOnePixelAddUp) {

@@ -19,6 +19,7 @@ struct SourceScript {
   bool weather_full = false;               ///< apply_weather(): no room
   std::uint64_t dropped_poses = 0;         ///< of every frame's statistics
   bool coarse = false;                     ///< likewise
+  std::uint32_t plain_targets = 0;         ///< likewise
   std::atomic<bool> device_failed{false};  ///< of every frame collected
   std::atomic<bool> device_lost{false};    ///< likewise
   std::vector<renderer::QualityLevelStats> quality_levels{
@@ -121,6 +122,7 @@ class ScriptedSource final : public server::FrameSource {
       view.sensor_pose = request.sensor_pose;
       view.stats.dropped_poses = script_.dropped_poses;
       view.stats.coarse = script_.coarse;
+      view.stats.plain_targets = script_.plain_targets;
       view.quality_level = request.quality_level;
       view.estimated_error_k =
           request.quality_level < script_.quality_levels.size()

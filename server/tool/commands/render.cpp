@@ -241,6 +241,11 @@ void Rendering::print_warnings(const renderer::FrameView& view) const {
   if (view.stats.clamped_px > 0) {
     warn(fmt::format("{}{} pixels lie outside a model's range", frame, view.stats.clamped_px));
   }
+  if (view.stats.plain_targets > 0) {
+    warn(fmt::format("{}{} small targets are too many for windows of their own and have one sample "
+                     "per pixel",
+                     frame, view.stats.plain_targets));
+  }
 }
 
 Json Rendering::run_json() const {
@@ -261,6 +266,7 @@ Json Rendering::frame_json(double time_s, std::size_t band, const renderer::Fram
   json.set("frame_ms", frames_->frame_ms());
   json.set("nonfinite_px", view.stats.nonfinite_px);
   json.set("clamped_px", view.stats.clamped_px);
+  json.set("plain_targets", view.stats.plain_targets);
   json.set("radiance", plane_json(view.radiance_w_m2_sr[band]));
   if (!view.temperature_k.empty()) {
     const auto sky =

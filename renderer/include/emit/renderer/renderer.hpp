@@ -124,6 +124,9 @@ struct FrameStats {
   /// have not taken in a change of the weather or of an entity's shade, and in a frame that
   /// prepared the surface anew (rewarm_s).
   bool coarse = false;
+  /// Small targets without a window of their own, because a frame has no more windows or its draws
+  /// fill their memory. They have one sample per pixel, so their energy is not kept.
+  std::uint32_t plain_targets = 0;
   /// Wall time that this frame spent on preparing the surface anew because the thermal time had
   /// jumped, s. It is 0 in other frames. Such a frame is also `coarse`.
   double rewarm_s = 0.0;

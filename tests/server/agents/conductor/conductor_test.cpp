@@ -79,6 +79,23 @@ TEST(RenderAgent, FramesOfASurfaceThatIsTooCoarseAreDegradedAndCounted) {
   EXPECT_EQ(rig.count(Counter::frames_coarse), 1U);
 }
 
+TEST(RenderAgent, FramesWithMoreSmallTargetsThanWindowsAreDegradedAndCounted) {
+  Rig rig;
+  rig.script.plain_targets = 3;
+  rig.send(1, 1);
+  rig.settle();
+  rig.script.plain_targets = 0;
+  rig.send(2, 2);
+  rig.settle();
+  ASSERT_EQ(rig.frames.size(), 2U);
+  for (const std::size_t i : {0U, 1U}) {
+    EXPECT_EQ((rig.frames[i].header.flags & protocol::kFlagDegraded) != 0U, i == 0U);
+    EXPECT_EQ(std::isnan(rig.frames[i].header.estimated_error_k), i == 0U);
+  }
+  EXPECT_EQ(rig.count(Counter::targets_plain), 3U);
+  EXPECT_EQ(rig.count(Counter::frames_coarse), 0U);
+}
+
 TEST(RenderAgent, AFrameInWhichTheSurfaceWarmsUpAgainIsDegradedCountedAndLogged) {
   using emit::test::kSecondNs;
   struct Case {
