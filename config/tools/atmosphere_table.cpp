@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "emit/physics/air_model.hpp"
 #include "emit/physics/constants.hpp"
@@ -33,8 +34,9 @@ int main() {
       "the\n"
       "# horizon the air is that of a level path. No scattered sunlight.\n"
       "band,range_m,elevation_deg,transmittance_frac,path_radiance_w_m2_sr\n");
-  for (const char* name : {"3-5", "8-12"}) {
-    const auto band = physics::BandAir::find(name);
+  for (const auto& [name, limits] : {std::pair{"3-5", physics::Band{3.0, 5.0, {}}},
+                                     std::pair{"8-12", physics::Band{8.0, 12.0, {}}}}) {
+    const auto band = physics::BandAir::build(limits);
     if (!band) return 1;
     for (const double elevation_deg : kElevationsDeg) {
       const double elevation_rad = std::max(elevation_deg, 0.0) * physics::kDegree;

@@ -49,8 +49,9 @@ static_assert(EMIT_MAX_ATMOSPHERE_TERMS == limits::kMaxAtmosphereTerms);
 
 /// Alignment of storage blocks. GL guarantees that no driver asks for more.
 constexpr std::size_t kBlockAlignment = 256;
-/// Largest number of planes: radiance of all bands, temperature, depth, object, sun, sky, coverage.
-constexpr std::size_t kMaxPlanes = EMIT_MAX_BANDS + 6;
+/// Largest number of planes: radiance of all bands, temperature, depth, object, sun, sky, what
+/// arrives in all bands, material, coverage.
+constexpr std::size_t kMaxPlanes = 2 * EMIT_MAX_BANDS + 7;
 
 /// Checks the limits of the renderer. Errors: config, naming the value and the limit.
 Result<void> check_limits(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
@@ -148,6 +149,8 @@ class GlRenderer final : public Renderer {
   void release(SlotIndex slot) noexcept override { readback_.release(slot); }
   std::span<const QualityLevelStats> expected_levels(const FrameRequest& request) noexcept override;
   physics::Pose scenario_sensor_pose_at(std::int64_t sim_time_ns) const noexcept override;
+  std::vector<RadianceTerms> radiance_terms(const FrameView& view, const glm::uvec2& px,
+                                            double normal_up) const override;
   std::optional<std::uint32_t> nearest_sample(const SurfacePlace& place) const noexcept override {
     return stage_->nearest_sample(place);
   }
@@ -240,7 +243,8 @@ RadianceContent radiance_content(const BandModel& bands, const OutputOptions& ou
           .outputs = (output.temperature ? EMIT_OUTPUT_TEMPERATURE : 0U) |
                      (output.depth ? EMIT_OUTPUT_DEPTH : 0U) |
                      (output.object ? EMIT_OUTPUT_OBJECT : 0U) |
-                     (output.sun ? EMIT_OUTPUT_SUN : 0U) | (output.sky ? EMIT_OUTPUT_SKY : 0U)};
+                     (output.sun ? EMIT_OUTPUT_SUN : 0U) | (output.sky ? EMIT_OUTPUT_SKY : 0U) |
+                     (output.terms ? EMIT_OUTPUT_TERMS : 0U)};
 }
 
 /// True when some object of the scenario is an entity.
@@ -252,7 +256,8 @@ bool has_entities(const scene::ScenarioDesc& scenario) {
 /// Number of planes that show surfaces: all but the coverage, which is the last.
 std::size_t surface_planes(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
   return scenario.bands.size() + (output.temperature ? 1U : 0U) + (output.depth ? 1U : 0U) +
-         (output.object ? 1U : 0U) + (output.sun ? 1U : 0U) + (output.sky ? 1U : 0U);
+         (output.object ? 1U : 0U) + (output.sun ? 1U : 0U) + (output.sky ? 1U : 0U) +
+         (output.terms ? scenario.bands.size() + 1 : 0U);
 }
 
 /// Number of planes of the output image.
@@ -336,6 +341,10 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
     if (output_.object) view.object_id = next_plane();
     if (output_.sun) view.sun_cosine = next_plane();
     if (output_.sky) view.sky_frac = next_plane();
+    for (std::size_t b = 0; output_.terms && b < scenario_.bands.size(); ++b) {
+      view.incoming_w_m2_sr.push_back(next_plane());
+    }
+    if (output_.terms) view.material = next_plane();
     if (output_.coverage) view.coverage_frac = next_plane();
   }
   glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
@@ -461,6 +470,34 @@ void GlRenderer::prepare(const FrameRequest& request, const QualityLevel& level)
   bands_.update(stage_->forcing_now(), sun, sensor_m);
   if (passes_.targets) passes_.targets->prepare(targets, camera.view, frame_params_);
   upload_frame();
+}
+
+std::vector<RadianceTerms> GlRenderer::radiance_terms(const FrameView& view, const glm::uvec2& px,
+                                                      double normal_up) const {
+  EMIT_CHECK(output_.terms && output_.temperature && output_.depth && output_.sun && output_.sky);
+  const std::size_t i = std::size_t{px.y} * view.width_px + px.x;
+  // Find the line of sight, by the numbers that the shader has.
+  const glm::vec2 middle(static_cast<float>(px.x) + 0.5F, static_cast<float>(px.y) + 0.5F);
+  const glm::vec2 tan = frame_params_.ray_at_corner + frame_params_.ray_per_px * middle;
+  const glm::vec3 ray(tan, 1.0F);
+  const glm::vec3 up(frame_params_.relworld_from_sensor[0].z,
+                     frame_params_.relworld_from_sensor[1].z,
+                     frame_params_.relworld_from_sensor[2].z);
+  BandModel::Seen seen;
+  seen.surface = std::isfinite(view.depth_m[i]);
+  seen.temperature_k = view.temperature_k[i];
+  seen.open_frac = view.sky_frac[i];
+  seen.sun_cosine = view.sun_cosine[i];
+  seen.normal_up = static_cast<float>(normal_up);
+  seen.material = static_cast<std::uint32_t>(view.material[i]);
+  seen.range_m = view.depth_m[i] * glm::length(ray);
+  seen.sin_elevation = glm::dot(up, ray) / glm::length(ray);
+  seen.sensor_height_m = frame_params_.sensor_height_m;
+  std::vector<RadianceTerms> out;
+  for (std::size_t b = 0; b < bands_.bands(); ++b) {
+    out.push_back(bands_.terms(b, seen, view.incoming_w_m2_sr[b][i]));
+  }
+  return out;
 }
 
 void GlRenderer::upload_frame() noexcept {

@@ -24,15 +24,6 @@ constexpr std::size_t kMaxTableFloats = 65536;
 static_assert(kMostBands == EMIT_MAX_BANDS);
 static_assert(physics::kSkyTilts == EMIT_SKY_TILTS);
 
-/// Band with its spectral response.
-physics::Band band_from(const scene::SpectralBand& desc) {
-  physics::Band band{desc.lo_um, desc.hi_um, {}};
-  for (const scene::ResponseSample& sample : desc.response) {
-    band.response.push_back({sample.wavelength_um, sample.response_frac});
-  }
-  return band;
-}
-
 /// Radiance of the sky by tilt over that of a blackbody, 1 - tau^m(elevation).
 physics::SkyByTilt sky_frac(double vertical_transmittance_frac) {
   return physics::sky_by_tilt([&](double sin_elevation) {
@@ -59,12 +50,10 @@ double band_emissivity_frac(const scene::Material& material, const std::string& 
   return material.emissivity_frac;
 }
 
-/// Sunlight in a band outside the atmosphere, normal to the sun at 1 au, W m-2: that of the
-/// built-in band, or of a blackbody of the sun's disc.
-double sun_outside_w_m2(const scene::SpectralBand& desc, const physics::Band& band) {
-  if (desc.response.empty()) {
-    if (const auto air = physics::BandAir::find(desc.name)) return air->sun_outside_w_m2();
-  }
+/// Sunlight in a band outside the atmosphere, normal to the sun at 1 au, W m-2: that of the air
+/// model's spectrum, or of a blackbody of the sun's disc where the model does not reach.
+double sun_outside_w_m2(const physics::Band& band) {
+  if (const auto air = physics::BandAir::build(band)) return air->sun_outside_w_m2();
   return physics::band_radiance(band, physics::Kelvin(physics::kSunTemperatureK)).radiance_w_m2_sr *
          physics::kPi * std::pow(std::sin(physics::kSunSemiAngleRad), 2);
 }
@@ -86,10 +75,10 @@ physics::Result<void> BandModel::build_views(const scene::ScenarioDesc& scenario
     for (std::size_t i = first; i < entries_.size(); ++i) {
       if ((air_model_ >> i & 1U) == 0) continue;
       if (*atmosphere_of(scenario, scenario.bands[i].name)->model != spec) continue;
-      auto band = physics::BandAir::find(scenario.bands[i].name);
+      auto band = physics::BandAir::build(entries_[i].band);
       if (!band) {
         return make_error(ErrorCode::config,
-                          fmt::format("band '{}': it has no built-in air", scenario.bands[i].name));
+                          fmt::format("band '{}': {}", scenario.bands[i].name, band.error().text));
       }
       members.push_back(i);
       bands.push_back(std::move(*band));
@@ -118,7 +107,7 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
   // Set up each band: its T ln L table, then the air as a table or as a sum of terms.
   BandModel model;
   for (const scene::SpectralBand& desc : scenario.bands) {
-    const physics::Band spectral = band_from(desc);
+    const physics::Band spectral = scene::spectral_band(desc);
     const auto lut = physics::BandRadianceLut::build(spectral);
     if (!lut) {
       return make_error(ErrorCode::config,
@@ -167,7 +156,7 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
           static_cast<float>(atmosphere->vertical_transmittance_frac);
     }
     // Compute the constants of sun and sky.
-    entry.sun_outside_w_m2 = sun_outside_w_m2(desc, entry.band);
+    entry.sun_outside_w_m2 = sun_outside_w_m2(entry.band);
     entry.sky_frac = sky_frac(entry.vertical_transmittance_frac);
     entry.has_sky = atmosphere != nullptr;
     model.nodes_per_band_ = static_cast<std::uint32_t>(lut->nodes().size());
@@ -320,6 +309,73 @@ void BandModel::update(const physics::Forcing& forcing, const physics::SunPositi
                     .cloud_radiance_w_m2_sr = cloud_w_m2_sr},
                    std::span(air_nodes_).subspan(params.air_view_first, physics::AirView::kNodes));
   }
+}
+
+RadianceTerms BandModel::terms(std::size_t band, const Seen& seen,
+                               float incoming_w_m2_sr) const noexcept {
+  const Entry& entry = entries_[band];
+  const gpu::BandParams& params = params_[band];
+  const auto air_nodes =
+      std::span(air_nodes_)
+          .subspan(params.air_view_first, entry.view ? physics::AirView::kNodes : 0);
+  RadianceTerms out;
+  if (!seen.surface) {
+    const float clouds = params.cloud_radiance_w_m2_sr;
+    if (entry.view) {
+      out.path_w_m2_sr = physics::air_sky(air_nodes, seen.sin_elevation).path_radiance_w_m2_sr;
+    } else if (entry.air) {
+      out.path_w_m2_sr =
+          params.clear_sky_frac * entry.air->out(seen.sin_elevation).path_radiance_w_m2_sr + clouds;
+    } else if (entry.has_sky) {
+      const double mass = physics::relative_air_mass(
+          physics::Radians(std::asin(std::clamp(seen.sin_elevation, 0.0F, 1.0F))));
+      out.path_w_m2_sr = params.sky_air_radiance_w_m2_sr *
+                             (1.0 - std::pow(entry.vertical_transmittance_frac, mass)) +
+                         clouds;
+    }
+    return out;
+  }
+  // Find what the air lets through and what it adds.
+  if (entry.view) {
+    const float target_m = seen.sensor_height_m + seen.range_m * seen.sin_elevation;
+    const auto node = physics::air_sight_node(air_nodes, target_m, seen.range_m);
+    // Between 300 K, 800 K and the sun the extinction goes linearly in 1 / T.
+    const float inverse = 1.0F / std::max(seen.temperature_k, 200.0F);
+    const float warm = (1.0F / 300.0F - inverse) / (1.0F / 300.0F - 1.0F / 800.0F);
+    const float hot = (1.0F / 800.0F - inverse) / (1.0F / 800.0F - 1.0F / 5772.0F);
+    const float log_extinction = hot > 0.0F ? std::lerp(node[1], node[2], std::min(hot, 1.0F))
+                                            : std::lerp(node[0], node[1], warm);
+    out.air_frac = std::exp(-std::exp(log_extinction) * seen.range_m);
+    out.air_sun_frac = std::exp(-std::exp(node[2]) * seen.range_m);
+    out.path_w_m2_sr = physics::air_path_w_m2_sr(node, seen.range_m);
+  } else if (entry.air) {
+    const auto air = entry.air->along(seen.range_m, seen.sin_elevation);
+    out.air_frac = out.air_sun_frac = air.transmittance_frac;
+    out.path_w_m2_sr = air.path_radiance_w_m2_sr;
+  } else if (entry.has_sky) {
+    out.air_frac = 0.0;
+    for (glm::length_t term = 0; term < EMIT_MAX_ATMOSPHERE_TERMS; ++term) {
+      out.air_frac += params.terms_amplitude_frac[term] *
+                      std::exp(-params.terms_extinction_per_m[term] * seen.range_m);
+    }
+    out.air_sun_frac = out.air_frac;
+    out.path_w_m2_sr = (1.0 - out.air_frac) * params.air_radiance_w_m2_sr;
+  }
+  // Split what leaves the surface.
+  out.emissivity_frac = emissivity_frac(seen.material, band);
+  const double reflected = (1.0 - out.emissivity_frac) * out.air_frac;
+  physics::SkyByTilt sky{};
+  for (std::size_t t = 0; t < physics::kSkyTilts; ++t) {
+    sky[t] = params.sky_by_tilt_w_m2_sr[t / 4][static_cast<glm::length_t>(t % 4)];
+  }
+  const double from_sky = seen.open_frac * physics::sky_at_tilt(sky, seen.normal_up);
+  out.emission_w_m2_sr =
+      out.emissivity_frac * black_w_m2_sr(band, seen.temperature_k) * out.air_frac;
+  out.sky_w_m2_sr = reflected * from_sky;
+  out.neighbours_w_m2_sr = reflected * (incoming_w_m2_sr - from_sky);
+  out.sun_w_m2_sr = (1.0 - out.emissivity_frac) * params.sun_irradiance_w_m2 / physics::kPi *
+                    seen.sun_cosine * out.air_sun_frac;
+  return out;
 }
 
 std::vector<gpu::MaterialParams> material_params(std::span<const scene::Material> materials,

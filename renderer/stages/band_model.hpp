@@ -12,6 +12,7 @@
 #include "emit/physics/planck.hpp"
 #include "emit/physics/sky_state.hpp"
 #include "emit/physics/weather.hpp"
+#include "emit/renderer/renderer.hpp"
 #include "emit/scene/scene_desc.hpp"
 #include "history/band_lights.hpp"
 #include "shared/frame_params.glsl.h"
@@ -43,6 +44,23 @@ class BandModel final : public BandLights {
                                       std::size_t band) const noexcept override {
     return tables_[first_emissivity_ + material * entries_.size() + band];
   }
+
+  /// What a pixel shows, as the radiance pass reads it.
+  struct Seen {
+    bool surface = false;  ///< false: sky, of which only the elevation counts
+    float temperature_k = 0.0F;
+    float open_frac = 0.0F;   ///< share of the hemisphere that shows sky
+    float sun_cosine = 0.0F;  ///< with the visible share of the sun
+    float normal_up = 1.0F;
+    std::uint32_t material = 0;
+    float range_m = 0.0F;
+    float sin_elevation = 0.0F;    ///< of the line of sight
+    float sensor_height_m = 0.0F;  ///< above sea level
+  };
+  /// Splits the radiance of a pixel of the instant of update(). `incoming_w_m2_sr` is what arrives
+  /// at the surface from everything but the sun. Twin of radiance.comp, in float32 like that.
+  [[nodiscard]] RadianceTerms terms(std::size_t band, const Seen& seen,
+                                    float incoming_w_m2_sr) const noexcept;
 
   /// Parameters by band, as the shaders read them.
   [[nodiscard]] std::span<const gpu::BandParams> params() const noexcept { return params_; }

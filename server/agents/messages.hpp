@@ -162,7 +162,7 @@ struct RenderDone {
   std::uint32_t nonfinite_px = 0;
   std::uint32_t clamped_px = 0;
   std::uint64_t dropped_poses = 0;  ///< of the histories, in this run
-  bool coarse = false;  ///< not prepared for a camera, or small targets without windows
+  bool coarse = false;              ///< not prepared for a camera, or small targets without windows
   bool warmed_up = false;           ///< the surface warmed up again within this frame
   std::uint8_t quality_level = 0;   ///< quality level, an index into the quality ladder
   float estimated_error_k = 0.0F;   ///< error of that level; NaN: not known

@@ -201,7 +201,7 @@ TEST_F(ConfigTest, the_shipped_atmosphere_table_agrees_with_what_it_was_made_fro
     ASSERT_TRUE(table.has_value()) << table.error().text;
     for (const double range_km : {0.012, 0.07, 0.4, 1.2, 6.0, 10.0}) {
       const auto path = physics::AirPath::between(*column, 2.0, 2.0, range_km * 1e3);
-      const double tau = physics::BandAir::find(loaded->bands[b].name)
+      const double tau = physics::BandAir::build(scene::spectral_band(loaded->bands[b]))
                              ->transmittance(path, physics::AirSource::black_300k);
       // The sum of exponentials is not one exponential between rows: 0.01 is the cell's own error.
       EXPECT_NEAR(table->along(range_km * 1e3, -0.1).transmittance_frac, tau, 0.01) << range_km;

@@ -241,12 +241,14 @@ TEST_F(ConfigTest, atmosphere_csv_amplitudes_must_add_up) {
 TEST_F(ConfigTest, built_in_atmosphere_meets_the_tabulated_transmittance) {
   const auto loaded = scenario("[atmosphere]\nmodel = \"midlatitude_summer\"\nwater_ratio = 1\n");
   ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
-  const auto tau = [](const scene::BandAtmosphere& band, double range_km) {
+  const auto tau = [&](const scene::BandAtmosphere& band, double range_km) {
+    const auto named = [&](const scene::SpectralBand& desc) { return desc.name == band.band; };
+    const auto desc = std::ranges::find_if(loaded->bands, named);
     const auto column = physics::AirColumn::build(band.model.value());
     EXPECT_TRUE(column.has_value());
-    return physics::BandAir::find(band.band)->transmittance(
-        physics::AirPath::between(*column, 0.0, 0.0, range_km * 1e3),
-        physics::AirSource::black_300k);
+    return physics::BandAir::build(scene::spectral_band(*desc))
+        ->transmittance(physics::AirPath::between(*column, 0.0, 0.0, range_km * 1e3),
+                        physics::AirSource::black_300k);
   };
   ASSERT_EQ(loaded->atmosphere.bands.size(), 2U);
   const scene::BandAtmosphere& lwir = loaded->atmosphere.bands[0];

@@ -122,7 +122,7 @@ class Sky {
       return std::vector<float>(plane.begin(), plane.end());
     };
     Picture out{copy(view.radiance_w_m2_sr[0]), copy(view.temperature_k), copy(view.depth_m),
-                copy(view.object_id), copy(view.coverage_frac), view.stats.plain_targets};
+                copy(view.object_id),           copy(view.coverage_frac), view.stats.plain_targets};
     renderer_->release(static_cast<renderer::SlotIndex>(slot));
     return out;
   }

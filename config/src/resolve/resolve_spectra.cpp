@@ -410,7 +410,7 @@ scene::AtmosphereDesc resolve_atmosphere(const Node& root, const scene::Scenario
                       fmt::format("'file': {} has no rows of band '{}': add them, or name the "
                                   "'model' that stands in for it",
                                   draft.file.string(), band.name));
-    } else if (built_in && physics::BandAir::find(band.name)) {
+    } else if (built_in && physics::BandAir::covers(scene::spectral_band(band))) {
       BandAtmosphere entry;
       entry.band = band.name;
       entry.model = built_in;
@@ -419,8 +419,8 @@ scene::AtmosphereDesc resolve_atmosphere(const Node& root, const scene::Scenario
       diagnostics.add(
           band_location(root, band.name, table),
           fmt::format("band '{}' has no atmosphere: add an [[atmosphere.band]] for it or "
-                      "set atmosphere.enabled = false",
-                      band.name));
+                      "set atmosphere.enabled = false (the built-in air covers {} to {:.2f} um)",
+                      band.name, physics::kAirShortestUm, physics::kAirLongestUm));
     }
   }
   return out;

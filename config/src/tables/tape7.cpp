@@ -274,19 +274,6 @@ Result<void> Tape7Reader::read_samples(const std::vector<Column>& columns, Tape7
   return {};
 }
 
-/// Response of a band at a wavelength.
-double response_at(const scene::SpectralBand& band, double um) {
-  if (um < band.lo_um || um > band.hi_um) return 0.0;
-  const auto& curve = band.response;
-  if (curve.empty()) return 1.0;
-  if (um < curve.front().wavelength_um || um > curve.back().wavelength_um) return 0.0;
-  std::size_t i = 1;
-  while (i + 1 < curve.size() && um > curve[i].wavelength_um) ++i;
-  const double f =
-      (um - curve[i - 1].wavelength_um) / (curve[i].wavelength_um - curve[i - 1].wavelength_um);
-  return curve[i - 1].response_frac + f * (curve[i].response_frac - curve[i - 1].response_frac);
-}
-
 }  // namespace
 
 bool is_tape7(const fs::path& file) {
@@ -308,6 +295,7 @@ std::optional<Tape7Air> tape7_air(const Tape7Run& run, const scene::SpectralBand
   constexpr double kSourceK = 300.0;
   // The ends may lie off the samples by what the printed wavenumbers are rounded to.
   constexpr double kRoundingPerCm = 0.01;
+  const physics::Band spectral = scene::spectral_band(band);
   const double low = kUmPerCm / band.hi_um;
   const double high = kUmPerCm / band.lo_um;
   const auto& samples = run.samples;
@@ -338,7 +326,7 @@ std::optional<Tape7Air> tape7_air(const Tape7Run& run, const scene::SpectralBand
         (nodes[i] - a.wavenumber_per_cm) / (b.wavenumber_per_cm - a.wavenumber_per_cm), 0.0, 1.0);
     const double source = planck(nodes[i], kSourceK);
     const double response =
-        response_at(band, std::clamp(kUmPerCm / nodes[i], band.lo_um, band.hi_um));
+        physics::response_frac(spectral, std::clamp(kUmPerCm / nodes[i], band.lo_um, band.hi_um));
     const double tau = a.transmittance_frac + f * (b.transmittance_frac - a.transmittance_frac);
     const double path = run.has_radiance
                             ? a.radiance_w_m2_sr_per_cm +

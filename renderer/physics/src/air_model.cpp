@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <numeric>
 
 #include "air_tables.hpp"
 #include "emit/physics/constants.hpp"
@@ -76,9 +77,29 @@ constexpr std::array<std::string_view, 6> kClimateNames{"tropical",           "m
                                                         "midlatitude_winter", "subarctic_summer",
                                                         "subarctic_winter",   "us_standard"};
 
+constexpr double kUmPerCm = 1e4;
+/// First of the temperatures at which emission is tabulated, and their distance: up to 370 K.
 constexpr double kEmissionFirstK = 150.0;
 constexpr double kEmissionStepK = 2.0;
-constexpr std::size_t kEmissionNodes = 111;  // up to 370 K
+
+/// Integrals of a band's response over wavelength, um, and over wavenumber, cm-1.
+struct Response {
+  double over_um = 0.0;
+  double over_per_cm = 0.0;
+};
+Response integrate_response(const Band& band) {
+  // The midpoint rule suffices: a piece of the spectrum is narrow.
+  constexpr int kPoints = 200;
+  const double step_um = (band.hi_um - band.lo_um) / kPoints;
+  Response sum;
+  for (int i = 0; i < kPoints; ++i) {
+    const double um = band.lo_um + (i + 0.5) * step_um;
+    const double response = response_frac(band, um);
+    sum.over_um += response * step_um;
+    sum.over_per_cm += response * step_um * kUmPerCm / (um * um);
+  }
+  return sum;
+}
 
 }  // namespace
 
@@ -306,58 +327,107 @@ AirPath AirPath::to_space(const AirColumn& column, double sensor_m, double eleva
   return path;
 }
 
-std::optional<BandAir> BandAir::find(std::string_view band) {
-  for (const air_tables::BandTerms& terms : air_tables::bands()) {
-    if (terms.name != band) continue;
-    BandAir out;
-    out.extinction_ = terms.extinction;
-    out.weight_ = terms.weight;
-    out.sun_w_m2_ = terms.sun_w_m2;
-    // Tabulate what each term emits by temperature.
-    constexpr auto& kNodesK = air_tables::kEmissionK;
-    for (std::size_t i = 0; i < kEmissionNodes; ++i) {
-      const double kelvin = kEmissionFirstK + kEmissionStepK * static_cast<double>(i);
-      const double planck =
-          band_radiance({terms.lo_um, terms.hi_um, {}}, Kelvin(kelvin)).radiance_w_m2_sr;
-      std::size_t j = 0;
-      while (j + 2 < kNodesK.size() && kelvin >= kNodesK[j + 1]) ++j;
-      const double f = std::clamp((kelvin - kNodesK[j]) / (kNodesK[j + 1] - kNodesK[j]), 0.0, 1.0);
-      Terms node{};
-      for (std::size_t k = 0; k < kAirTerms; ++k) {
-        const double low = terms.emission_weight[j][k];
-        node[k] = planck * (low + f * (terms.emission_weight[j + 1][k] - low));
-      }
-      out.emission_.push_back(node);
+bool BandAir::covers(const Band& band) noexcept {
+  double lo_um = band.lo_um;
+  double hi_um = band.hi_um;
+  if (!band.response.empty()) {
+    lo_um = std::max(lo_um, band.response.front().wavelength_um);
+    hi_um = std::min(hi_um, band.response.back().wavelength_um);
+  }
+  return lo_um >= kAirShortestUm && hi_um <= kAirLongestUm;
+}
+
+Result<BandAir> BandAir::build(const Band& band) {
+  if (auto valid = validate(band); !valid) return tl::unexpected(std::move(valid.error()));
+  if (!covers(band)) {
+    return make_error(ErrorCode::invalid_argument,
+                      fmt::format("the built-in air covers {} to {:.2f} um, the band {} to {} um",
+                                  kAirShortestUm, kAirLongestUm, band.lo_um, band.hi_um));
+  }
+  BandAir out;
+  for (const air_tables::BandTerms& own : air_tables::bands()) {
+    if (own.lo_um != band.lo_um || own.hi_um != band.hi_um || !band.response.empty()) continue;
+    // Take the terms that were fitted to the band.
+    out.sun_w_m2_ = own.sun_w_m2;
+    for (std::size_t t = 0; t < air_tables::kBandTerms; ++t) {
+      Term term{own.extinction[t], {}};
+      for (std::size_t s = 0; s < kAirSources; ++s) term.share_frac[s] = own.weight[s][t];
+      out.add_term(term, [&](double kelvin) {
+        constexpr auto& kNodesK = air_tables::kEmissionK;
+        std::size_t j = 0;
+        while (j + 2 < kNodesK.size() && kelvin >= kNodesK[j + 1]) ++j;
+        const double f =
+            std::clamp((kelvin - kNodesK[j]) / (kNodesK[j + 1] - kNodesK[j]), 0.0, 1.0);
+        return band_radiance(band, Kelvin(kelvin)).radiance_w_m2_sr *
+               std::lerp(own.emission_weight[j][t], own.emission_weight[j + 1][t], f);
+      });
     }
     return out;
   }
-  return std::nullopt;
+  out.add_spectrum(band);
+  return out;
 }
 
-void BandAir::pass(const AirPath::Stretch& stretch, Terms& passed) const noexcept {
-  for (std::size_t t = 0; t < kAirTerms; ++t) {
-    double depth = 0.0;
-    for (std::size_t k = 0; k < kAirAbsorbers; ++k) depth += extinction_[t][k] * stretch.amount[k];
-    passed[t] *= std::exp(-depth);
+template <class Emission>
+void BandAir::add_term(const Term& term, Emission emission) {
+  terms_.push_back(term);
+  for (std::size_t i = 0; i < kEmissionNodes; ++i) {
+    emission_.push_back(emission(kEmissionFirstK + kEmissionStepK * static_cast<double>(i)));
   }
 }
 
-double BandAir::emitted_w_m2_sr(double kelvin, const Terms& before,
-                                const Terms& after) const noexcept {
+/// Makes the terms out of those of the spectrum's pieces in the band.
+void BandAir::add_spectrum(const Band& band) {
+  std::array<double, kAirSources> sum{};
+  for (const air_tables::Piece& piece : air_tables::pieces()) {
+    Band part = band;
+    part.lo_um = std::max(band.lo_um, kUmPerCm / piece.to_per_cm);
+    part.hi_um = std::min(band.hi_um, kUmPerCm / piece.from_per_cm);
+    if (!validate(part)) continue;  // the response is zero here
+    // Find what each kind of source has in the piece.
+    const Response response = integrate_response(part);
+    const auto black = [&part](double kelvin) {
+      return band_radiance(part, Kelvin(kelvin)).radiance_w_m2_sr;
+    };
+    const std::array<double, kAirSources> source{black(300.0), black(800.0),
+                                                 black(kSunTemperatureK), response.over_um,
+                                                 piece.sun_w_m2_cm * response.over_per_cm};
+    for (std::size_t s = 0; s < kAirSources; ++s) sum[s] += source[s];
+    std::array<double, kEmissionNodes> emitted;
+    for (std::size_t i = 0; i < kEmissionNodes; ++i) {
+      emitted[i] = black(kEmissionFirstK + kEmissionStepK * static_cast<double>(i));
+    }
+    // The printed weights add up to 1 but for rounding.
+    const double weights = std::accumulate(piece.weight.begin(), piece.weight.end(), 0.0);
+    for (std::size_t t = 0; t < air_tables::kPieceTerms; ++t) {
+      const double weight = piece.weight[t] / weights;
+      Term term{piece.extinction[t], source};
+      for (double& share : term.share_frac) share *= weight;
+      terms_.push_back(term);
+      for (const double radiance : emitted) emission_.push_back(weight * radiance);
+    }
+  }
+  for (Term& term : terms_) {
+    for (std::size_t s = 0; s < kAirSources; ++s) term.share_frac[s] /= sum[s];
+  }
+  sun_w_m2_ = sum[static_cast<std::size_t>(AirSource::sun_lowtran)];
+}
+
+double BandAir::through(const Term& term, const AirPath::Stretch& stretch) noexcept {
+  double depth = 0.0;
+  for (std::size_t k = 0; k < kAirAbsorbers; ++k) depth += term.extinction[k] * stretch.amount[k];
+  return std::exp(-depth);
+}
+
+BandAir::Warmth BandAir::warmth_of(const AirPath::Stretch& stretch, double warmer_k) noexcept {
+  // The difference from the climate fades upwards.
+  const double kelvin =
+      stretch.kelvin +
+      (warmer_k == 0.0 ? 0.0 : warmer_k * std::exp(-stretch.height_m / kWarmthScaleM));
   const double place = std::clamp((kelvin - kEmissionFirstK) / kEmissionStepK, 0.0,
                                   static_cast<double>(kEmissionNodes - 1));
-  const std::size_t i = std::min(static_cast<std::size_t>(place), kEmissionNodes - 2);
-  const double f = place - static_cast<double>(i);
-  double sum = 0.0;
-  for (std::size_t t = 0; t < kAirTerms; ++t) {
-    const double source = emission_[i][t] + f * (emission_[i + 1][t] - emission_[i][t]);
-    sum += source * (before[t] - after[t]);
-  }
-  return sum;
-}
-
-double BandAir::warmth_frac(double height_m) noexcept {
-  return std::exp(-height_m / kWarmthScaleM);
+  const std::size_t node = std::min(static_cast<std::size_t>(place), kEmissionNodes - 2);
+  return {node, place - static_cast<double>(node)};
 }
 
 double BandAir::sun_w_m2(const AirPath& to_sun) const noexcept {

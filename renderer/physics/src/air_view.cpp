@@ -2,7 +2,9 @@
 #include "emit/physics/air_view.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <thread>
 
 #include "emit/physics/check.hpp"
 
@@ -34,6 +36,13 @@ double view_range_m(std::size_t i) {
   return AirView::kNearestM *
          std::pow(AirView::kFarthestM / AirView::kNearestM,
                   static_cast<double>(i) / static_cast<double>(AirView::kRanges - 1));
+}
+
+/// Smallest range of a line of sight whose ends lie in the cells around two nodes of height.
+double nearest_range_m(std::size_t sensor, std::size_t target) {
+  const std::size_t low = std::min(sensor, target);
+  const std::size_t high = std::max(sensor, target);
+  return high - low <= 2 ? 0.0 : kHeightM[high - 1] - kHeightM[low + 1];
 }
 
 double view_elevation_rad(std::size_t i) {
@@ -94,12 +103,13 @@ float view_opacity(float x) noexcept {
 std::vector<AirView> AirView::build(const AirColumn& column, std::span<const Subject> subjects) {
   constexpr double kLeast = 1e-30;
   std::vector<AirView> views(subjects.size());
+  for (AirView& view : views) view.slices_.resize(kHeights * kNodes);
   // Evaluate a path for all subjects. A range of 0 stands for the path to space.
-  const auto add = [&](const AirPath& path, double range_m) {
+  const auto fill = [&](std::size_t node, const AirPath& path, double range_m) {
     const bool sky = range_m == 0.0;
     for (std::size_t v = 0; v < subjects.size(); ++v) {
       const auto sight = subjects[v].band->evaluate(path, subjects[v].sources, kWarmerK);
-      Slice slice{};
+      Slice& slice = views[v].slices_[node];
       double opaque = 1.0;
       for (std::size_t k = 0; k < slice.air.size(); ++k) {
         const double tau = std::clamp(sight.transmittance_frac[k], kLeast, 1.0 - 1e-12);
@@ -111,19 +121,37 @@ std::vector<AirView> AirView::build(const AirColumn& column, std::span<const Sub
         slice.log_radiance[w] =
             static_cast<float>(std::log(std::max(sight.path_radiance_w_m2_sr[w] / opaque, kLeast)));
       }
-      views[v].slices_.push_back(slice);
     }
   };
-  for (const double sensor_m : kHeightM) {
-    for (const double target_m : kHeightM) {
-      for (std::size_t r = 0; r < kRanges; ++r) {
-        add(AirPath::between(column, sensor_m, target_m, view_range_m(r)), view_range_m(r));
+  const auto fill_sensor = [&](std::size_t sensor) {
+    std::size_t node = sensor * kNodes;
+    for (std::size_t target = 0; target < kHeights; ++target, node += kRanges) {
+      const double nearest_m = nearest_range_m(sensor, target);
+      for (std::size_t r = kRanges; r-- > 0;) {
+        // No lookup comes between heights that are farther apart than the range.
+        if (r + 1 < kRanges && view_range_m(r + 1) < nearest_m) {
+          for (AirView& view : views) view.slices_[node + r] = view.slices_[node + r + 1];
+          continue;
+        }
+        fill(node + r,
+             AirPath::between(column, kHeightM[sensor], kHeightM[target], view_range_m(r)),
+             view_range_m(r));
       }
     }
     for (std::size_t e = 0; e < kElevations; ++e) {
-      add(AirPath::to_space(column, sensor_m, view_elevation_rad(e)), 0.0);
+      fill(node + e, AirPath::to_space(column, kHeightM[sensor], view_elevation_rad(e)), 0.0);
     }
-  }
+  };
+  // Share the sensors' heights among the processors.
+  std::atomic<std::size_t> next{0};
+  const auto work = [&] {
+    for (std::size_t i = next++; i < kHeights; i = next++) fill_sensor(i);
+  };
+  std::vector<std::jthread> others;
+  const std::size_t cores = std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, 8);
+  for (std::size_t i = 1; i < cores; ++i) others.emplace_back(work);
+  work();
+  others.clear();
   return views;
 }
 
@@ -197,7 +225,8 @@ double AirView::sun_transmittance_frac(double height_m, double sin_elevation) co
   return std::exp(-(low + cell.fraction * (depth(cell.index + 1) - low)));
 }
 
-AirSight air_sight(std::span<const AirView::Node> table, float target_m, float range_m) noexcept {
+AirView::Node air_sight_node(std::span<const AirView::Node> table, float target_m,
+                             float range_m) noexcept {
   static const float kPerRange = static_cast<float>(
       (AirView::kRanges - 1) / std::log(AirView::kFarthestM / AirView::kNearestM));
   const ViewCell target = view_cell(height_place(target_m), AirView::kHeights);
@@ -208,12 +237,20 @@ AirSight air_sight(std::span<const AirView::Node> table, float target_m, float r
     const std::size_t i = t * AirView::kRanges + range.index;
     return mix_nodes(table[i], table[i + 1], range.fraction);
   };
-  const AirView::Node node = mix_nodes(row(target.index), row(target.index + 1), target.fraction);
+  return mix_nodes(row(target.index), row(target.index + 1), target.fraction);
+}
+
+float air_path_w_m2_sr(const AirView::Node& node, float range_m) noexcept {
+  return view_opacity(std::exp(node[0]) * range_m) * node[3];
+}
+
+AirSight air_sight(std::span<const AirView::Node> table, float target_m, float range_m) noexcept {
+  const AirView::Node node = air_sight_node(table, target_m, range_m);
   AirSight out;
   for (std::size_t k = 0; k < 3; ++k) {
     out.transmittance_frac[k] = std::exp(-std::exp(node[k]) * range_m);
   }
-  out.path_radiance_w_m2_sr = view_opacity(std::exp(node[0]) * range_m) * node[3];
+  out.path_radiance_w_m2_sr = air_path_w_m2_sr(node, range_m);
   return out;
 }
 

@@ -120,6 +120,21 @@ void for_each_stretch(const Band& band, Visit visit) {
 
 }  // namespace
 
+double response_frac(const Band& band, double wavelength_um) noexcept {
+  if (!(wavelength_um >= band.lo_um) || wavelength_um > band.hi_um) return 0.0;
+  const std::vector<ResponsePoint>& curve = band.response;
+  if (curve.empty()) return 1.0;
+  if (wavelength_um < curve.front().wavelength_um || wavelength_um > curve.back().wavelength_um) {
+    return 0.0;
+  }
+  std::size_t i = 1;
+  while (i + 1 < curve.size() && wavelength_um > curve[i].wavelength_um) ++i;
+  const ResponsePoint& a = curve[i - 1];
+  const ResponsePoint& b = curve[i];
+  return a.response_frac + (wavelength_um - a.wavelength_um) / (b.wavelength_um - a.wavelength_um) *
+                               (b.response_frac - a.response_frac);
+}
+
 Result<void> validate(const Band& band) {
   if (!(band.lo_um > 0.0) || !(band.hi_um > band.lo_um) || !(band.hi_um <= 1000.0)) {
     return make_error(ErrorCode::invalid_argument,

@@ -114,13 +114,14 @@ physics::Result<BandRadiance> BandRadiance::create(const scene::ScenarioDesc& sc
       out.has_air_ = true;
       if (entry.model) {
         auto column = physics::AirColumn::build(*entry.model);
-        out.air_terms_ = physics::BandAir::find(out.name_);
-        if (!column || !out.air_terms_) {
+        auto terms = physics::BandAir::build(scene::spectral_band(scenario.bands[band]));
+        if (!column || !terms) {
           return physics::make_error(
               physics::ErrorCode::config,
               fmt::format("band '{}': {}", out.name_,
-                          column ? "it has no built-in air" : column.error().text));
+                          column ? terms.error().text : column.error().text));
         }
+        out.air_terms_ = std::move(*terms);
         out.column_ = std::move(*column);
       } else if (entry.table.empty()) {
         out.terms_ = entry.terms;
@@ -137,11 +138,10 @@ physics::Result<BandRadiance> BandRadiance::create(const scene::ScenarioDesc& sc
     }
   }
   out.place_m_ = scenario.place.height_m;
-  const auto built_in = scenario.bands[band].response.empty() ? physics::BandAir::find(out.name_)
-                                                              : std::optional<physics::BandAir>();
-  out.sun_outside_w_m2_ = built_in ? built_in->sun_outside_w_m2()
-                                   : out.black(physics::kSunTemperatureK) * physics::kPi *
-                                         std::pow(std::sin(physics::kSunSemiAngleRad), 2);
+  const auto air = physics::BandAir::build(scene::spectral_band(scenario.bands[band]));
+  out.sun_outside_w_m2_ = air ? air->sun_outside_w_m2()
+                              : out.black(physics::kSunTemperatureK) * physics::kPi *
+                                    std::pow(std::sin(physics::kSunSemiAngleRad), 2);
   return out;
 }
 

@@ -228,6 +228,10 @@ void write_pixel(ivec2 px) {
   if ((EMIT_OUTPUTS & EMIT_OUTPUT_SKY) != 0u) {
     planes[plane++ * plane_px + pixel] = surface ? seen.open_frac : uintBitsToFloat(0x7fc00000u);
   }
+  if ((EMIT_OUTPUTS & EMIT_OUTPUT_TERMS) != 0u) {
+    for (uint i = 0u; i < EMIT_BANDS; ++i) planes[plane++ * plane_px + pixel] = surface ? incoming[i] : 0.0;
+    planes[plane++ * plane_px + pixel] = surface ? float(seen.material) : 0.0;
+  }
   // Count the pixel if it is flagged.
   int flags = (nonfinite ? EMIT_FLAG_NONFINITE : 0) + (clamped ? EMIT_FLAG_CLAMPED : 0);
   if (flags != 0) atomicAdd(stats.flagged_px[flags], 1u);

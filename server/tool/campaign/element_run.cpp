@@ -157,7 +157,7 @@ void add_surface(const Picture& picture, ResultRow& row) {
 /// Errors of the surface temperature and of the radiance in the first band.
 Result<void> add_errors(const scene::ScenarioDesc& scenario, const Picture& picture,
                         const Picture& truth, ResultRow& row) {
-  const ApparentTemperature table(spectral_band(scenario.bands.front()));
+  const ApparentTemperature table(scene::spectral_band(scenario.bands.front()));
   const auto diff = image::compare_images(
       picture.image, truth.image,
       [&table](double radiance_w_m2_sr) { return table.kelvin_per_radiance(radiance_w_m2_sr); });

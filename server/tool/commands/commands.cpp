@@ -10,6 +10,7 @@
 #include "tool/doctor/doctor_command.hpp"
 #include "tool/engage/engage_command.hpp"
 #include "tool/nature/weather_command.hpp"
+#include "tool/offline/explain_command.hpp"
 #include "tool/offline/probe_command.hpp"
 #include "tool/scenes/scene_command.hpp"
 
@@ -27,12 +28,12 @@ int run_tool(int argc, char** argv, const LabCommands& lab) {
   CommandLine tool = program.root();
   // The order is that of `emit --help`.
   for (const auto add :
-       {add_render,     add_probe,  add_solve,     add_inspect,  add_scene,   add_compare,
-        add_generate,   add_view,   add_campaign,  add_demo,     add_engage,  add_serve,
-        add_receive,    add_stat,   add_send,      add_latency,  add_trigger, add_fms_sim,
-        add_trace,      add_record, add_replay,    add_log,      add_export,  add_make_log,
-        add_weather,    add_doctor, lab.materials, lab.evaluate, lab.fit,     lab.bench,
-        lab.completion, lab.man}) {
+       {add_render,   add_probe,      add_explain, add_solve,     add_inspect,  add_scene,
+        add_compare,  add_generate,   add_view,    add_campaign,  add_demo,     add_engage,
+        add_serve,    add_receive,    add_stat,    add_send,      add_latency,  add_trigger,
+        add_fms_sim,  add_trace,      add_record,  add_replay,    add_log,      add_export,
+        add_make_log, add_weather,    add_doctor,  lab.materials, lab.evaluate, lab.fit,
+        lab.bench,    lab.completion, lab.man}) {
     add(tool);
   }
   return program.run(argc, argv);

@@ -270,7 +270,7 @@ Result<void> Demo::save_frame() {
   const std::size_t band = band_of_channel(scenario_, scene::ChannelKind::injection);
   if (!apparent_ && band < scenario_.bands.size() &&
       scenario_.bands[band].name == tcp_client_->channel().band) {
-    apparent_.emplace(spectral_band(scenario_.bands[band]));
+    apparent_.emplace(scene::spectral_band(scenario_.bands[band]));
   }
   planes.apparent = apparent_ ? &*apparent_ : nullptr;
   planes.metadata = {snapshot.header.sim_time_ns,

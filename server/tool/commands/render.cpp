@@ -179,7 +179,7 @@ physics::Result<void> Rendering::write_pictures(double time_s, std::size_t band,
   const PngStyle style{scenario_.display.min_k, scenario_.display.max_k,
                        png_quantity(command_.png_of)};
   if (style.quantity == PngQuantity::apparent && !apparent_[band]) {
-    apparent_[band].emplace(spectral_band(shown));
+    apparent_[band].emplace(scene::spectral_band(shown));
   }
   planes.apparent = apparent_[band] ? &*apparent_[band] : nullptr;
   if (plan_.png_names) {
@@ -201,9 +201,10 @@ physics::Result<void> Rendering::write_files(double time_s, std::size_t band,
   planes.depth_m = view.depth_m;
   planes.object_id = view.object_id;
   planes.coverage_frac = view.coverage_frac;
-  planes.metadata = {view.sim_time_ns, view.frame_number,  view.sensor_pose,
-                     shown.name,       shown.lo_um,        shown.hi_um,
-                     "W m-2 sr-1",     response_of(shown), view.fov_h_rad};
+  planes.metadata = {
+      view.sim_time_ns, view.frame_number, view.sensor_pose, shown.name,
+      shown.lo_um,      shown.hi_um,       "W m-2 sr-1",     scene::spectral_band(shown).response,
+      view.fov_h_rad};
   if (auto done = write_pictures(time_s, band, planes); !done) return done;
   if (!wants(command_, "temperature")) planes.temperature_k = {};
   return write_frame_exr(plan_.exr_names.file(time_s, shown.name), planes);
@@ -242,9 +243,10 @@ void Rendering::print_warnings(const renderer::FrameView& view) const {
     warn(fmt::format("{}{} pixels lie outside a model's range", frame, view.stats.clamped_px));
   }
   if (view.stats.plain_targets > 0) {
-    warn(fmt::format("{}{} small targets are too many for windows of their own and have one sample "
-                     "per pixel",
-                     frame, view.stats.plain_targets));
+    warn(
+        fmt::format("{}{} small targets are too many for windows of their own and have one sample "
+                    "per pixel",
+                    frame, view.stats.plain_targets));
   }
 }
 

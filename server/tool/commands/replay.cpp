@@ -64,7 +64,8 @@ class FrameFolder {
       : folder_(std::move(folder)),
         band_(scenario.bands.empty() ? scene::SpectralBand{} : scenario.bands.front()),
         style_{scenario.display.min_k, scenario.display.max_k, png_quantity(png_of)} {
-    if (physics::validate(spectral_band(band_))) apparent_.emplace(spectral_band(band_));
+    if (physics::validate(scene::spectral_band(band_)))
+      apparent_.emplace(scene::spectral_band(band_));
   }
 
   [[nodiscard]] physics::Result<void> write(const server::ReplayedFrame& frame) const {
@@ -78,9 +79,15 @@ class FrameFolder {
     planes.depth_m = frame.view->depth_m;
     planes.object_id = frame.view->object_id;
     planes.apparent = apparent_ ? &*apparent_ : nullptr;
-    planes.metadata = {frame.sim_time_ns, frame.frame_number, frame.view->sensor_pose,
-                       band_.name,        band_.lo_um,        band_.hi_um,
-                       "W m-2 sr-1",      response_of(band_), frame.view->fov_h_rad};
+    planes.metadata = {frame.sim_time_ns,
+                       frame.frame_number,
+                       frame.view->sensor_pose,
+                       band_.name,
+                       band_.lo_um,
+                       band_.hi_um,
+                       "W m-2 sr-1",
+                       scene::spectral_band(band_).response,
+                       frame.view->fov_h_rad};
     return write_frame_files(folder_, planes, style_);
   }
 

@@ -212,9 +212,10 @@ physics::Result<void> Solving::write_picture(const SolveCamera& camera, double t
     planes.temperature_k = image.temperature_k;
     planes.depth_m = image.depth_m;
     planes.object_id = image.object_id;
-    planes.metadata = {view.sim_time_ns, 1,           view.sensor_pose, shown.name,
-                       shown.lo_um,      shown.hi_um, "W m-2 sr-1",     response_of(shown),
-                       view.fov_h_rad};
+    planes.metadata = {
+        view.sim_time_ns, 1,           view.sensor_pose, shown.name,
+        shown.lo_um,      shown.hi_um, "W m-2 sr-1",     scene::spectral_band(shown).response,
+        view.fov_h_rad};
     const auto file = names_of(command_.out, plan_, camera).file(time_s, shown.name);
     if (auto done = write_frame_exr(file, planes); !done) return done;
     if (command_.png) {

@@ -110,7 +110,7 @@ Result<void> write_png(const TrackerStudyOptions& options, const StudySet& set,
   planes.radiance_w_m2_sr = picture.radiance_w_m2_sr;
   planes.apparent = &apparent;
   planes.metadata = {0,          1,          set.camera,   band.name,
-                     band.lo_um, band.hi_um, "W m-2 sr-1", response_of(band)};
+                     band.lo_um, band.hi_um, "W m-2 sr-1", scene::spectral_band(band).response};
   return write_frame_png(options.out / name, planes,
                          {set.truth.display.min_k, set.truth.display.max_k});
 }
@@ -150,7 +150,7 @@ Result<double> render_all(const TrackerStudyOptions& options, const StudySet& se
   if (auto done = write_all(options, "plain", plain); !done) return tl::unexpected(done.error());
   if (auto done = write_all(options, "none", none); !done) return tl::unexpected(done.error());
 
-  const ApparentTemperature apparent(spectral_band(set.truth.bands[set.band]));
+  const ApparentTemperature apparent(scene::spectral_band(set.truth.bands[set.band]));
   const std::pair<std::string, const StudyPicture*> shown[] = {
       {"study_truth_begin.png", &truth->front()},
       {"study_truth_end.png", &truth->back()},

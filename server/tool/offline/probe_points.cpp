@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -174,6 +175,21 @@ Result<std::vector<ProbePoint>> ProbeFinder::read(const std::string& text) const
     points.push_back(std::move(point));
   }
   return points;
+}
+
+ProbePoint ProbeFinder::follow(const ProbePlace& place, std::int64_t sim_time_ns,
+                               std::string name) const {
+  ProbePoint point{std::move(name), ProbePoint::Kind::part, place.position_m, place.normal};
+  const std::vector<reference::RayMesh>& meshes = rays_.desc().meshes;
+  const auto mesh = std::ranges::find(meshes, place.object, &reference::RayMesh::object);
+  point.mesh = static_cast<std::uint32_t>(mesh - meshes.begin());
+  if (mesh->entity != reference::kNoEntity) {
+    const physics::Pose pose = rays_.at(sim_time_ns).entity_pose(mesh->entity);
+    const glm::dquat body_from_world = glm::conjugate(pose.world_from_body);
+    point.position_m = body_from_world * (place.position_m - pose.position_world_m);
+    point.normal = body_from_world * place.normal;
+  }
+  return point;
 }
 
 std::optional<ProbePlace> ProbeFinder::place(const ProbePoint& point, std::int64_t sim_time_ns,

@@ -56,6 +56,16 @@ class ProbeFinder {
   [[nodiscard]] std::optional<ProbePlace> place(const ProbePoint& point, std::int64_t sim_time_ns,
                                                 const physics::Pose& sensor) const;
 
+  /// Returns a point that stays where a place is on its body, which may move. `sim_time_ns` is the
+  /// instant of the place.
+  [[nodiscard]] ProbePoint follow(const ProbePlace& place, std::int64_t sim_time_ns,
+                                  std::string name) const;
+  /// Returns the name of a material of the loaded scene.
+  /// @pre index is that of a pixel's material
+  [[nodiscard]] const std::string& material_name(std::size_t index) const {
+    return geometry_.materials[index].name;
+  }
+
  private:
   ProbeFinder(const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
               reference::RayScene rays)

@@ -146,7 +146,7 @@ Result<std::vector<SheetPicture>> render_pictures(const scene::ScenarioDesc& sce
                                                   const PreviewPlan& plan, const scene::Aabb& box) {
   std::vector<ApparentTemperature> tables;
   for (const std::size_t band : plan.bands) {
-    tables.emplace_back(spectral_band(scenario.bands[band]));
+    tables.emplace_back(scene::spectral_band(scenario.bands[band]));
   }
   std::vector<SheetPicture> pictures;
   for (std::size_t time = 0; time < plan.times_s.size(); ++time) {

@@ -15,18 +15,6 @@ namespace emit::tool {
 using physics::ErrorCode;
 using physics::make_error;
 
-physics::Band spectral_band(const scene::SpectralBand& band) {
-  return {band.lo_um, band.hi_um, response_of(band)};
-}
-
-std::vector<physics::ResponsePoint> response_of(const scene::SpectralBand& band) {
-  std::vector<physics::ResponsePoint> out;
-  for (const scene::ResponseSample& sample : band.response) {
-    out.push_back({sample.wavelength_um, sample.response_frac});
-  }
-  return out;
-}
-
 std::optional<physics::Band> spectral_band(const image::FrameMetadata& metadata) {
   physics::Band band{metadata.band_lo_um, metadata.band_hi_um,
                      metadata.band_response.value_or(std::vector<physics::ResponsePoint>())};

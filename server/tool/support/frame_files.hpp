@@ -20,14 +20,9 @@ namespace emit::tool {
 
 using ApparentTemperature = image::TemperatureTable;
 
-/// Returns the scenario's band in the form of the radiometry, response included.
-[[nodiscard]] physics::Band spectral_band(const scene::SpectralBand& band);
-
 /// Returns the band of a frame's attributes; a rectangle where they do not give the response. The
 /// result is empty for a frame without a band, or with one that fails physics::validate().
 [[nodiscard]] std::optional<physics::Band> spectral_band(const image::FrameMetadata& metadata);
-/// Returns the response for a frame's attributes.
-[[nodiscard]] std::vector<physics::ResponsePoint> response_of(const scene::SpectralBand& band);
 /// Describes for the user how radiances become kelvins: "band 3-5 um by its response of 12 points".
 [[nodiscard]] std::string conversion_text(const physics::Band& band, bool response_known);
 

@@ -60,7 +60,7 @@ TEST(ReferenceSky, agrees_with_the_tables_of_the_renderer_under_clouds) {
     const auto& band = scenario.bands[b];
     auto own = BandRadiance::create(scenario, b);
     ASSERT_TRUE(own) << own.error().text;
-    const physics::BandAir terms = *physics::BandAir::find(band.name);
+    const physics::BandAir terms = *physics::BandAir::build(scene::spectral_band(band));
     const physics::AirView::Subject subject{&terms};
     const auto views = physics::AirView::build(*column, std::span(&subject, 1));
     std::vector<physics::AirView::Node> table(physics::AirView::kNodes);

@@ -142,7 +142,7 @@ TEST(RendererAtmosphere, every_pixel_sees_built_in_air_between_the_heights_of_ca
       physics::Kelvin(physics::usual_dew_point_k(scenario.weather[0].air_k)), 0.0);
   const auto column = physics::AirColumn::build(spec);
   ASSERT_TRUE(column) << column.error().text;
-  const auto terms = physics::BandAir::find("8-12");
+  const auto terms = physics::BandAir::build({8.0, 12.0, {}});
   ASSERT_TRUE(terms);
   const double leaving =
       physics::band_radiance({8.0, 12.0, {}}, physics::Kelvin(kSurfaceK)).radiance_w_m2_sr;

@@ -57,6 +57,8 @@ struct OutputOptions {
   /// Share of the pixel that small targets cover (scene::SensorDesc::small_target_px), 0..1. Where
   /// it is not 0 the other planes show the nearest of these targets.
   bool coverage = false;
+  /// What Renderer::radiance_terms() needs.
+  bool terms = false;
   Ladder ladder = Ladder::none;
   std::uint32_t slots = 3;    ///< read-back slots, 2..16: frames in flight plus frames being sent
   bool stage_timing = false;  ///< fills FrameView::stages_ms; the renderer waits after each stage
@@ -146,7 +148,11 @@ struct FrameView {
   std::span<const float> object_id;                      ///< empty unless asked for
   std::span<const float> sun_cosine;                     ///< empty unless asked for
   std::span<const float> sky_frac;                       ///< empty unless asked for
-  std::span<const float> coverage_frac;                  ///< empty unless asked for
+  /// What arrives at the surface from everything but the sun, one plane per band; material; empty
+  /// unless OutputOptions::terms.
+  std::vector<std::span<const float>> incoming_w_m2_sr;
+  std::span<const float> material;
+  std::span<const float> coverage_frac;  ///< empty unless asked for
   FrameStats stats;
   std::uint8_t quality_level = 0;  ///< quality level that was rendered
   /// Expected difference from full quality: RMS of the apparent temperature over the image, K, in
@@ -161,6 +167,23 @@ struct FrameView {
 struct SurfacePlace {
   glm::dvec3 position_world_m{0.0};
   glm::dvec3 normal{0.0, 0.0, 1.0};  ///< outward, unit length, world axes
+};
+
+/// Where the radiance of a pixel comes from, in one band. The radiances are W m-2 sr-1 at the
+/// aperture, behind the air, and add up to the pixel.
+struct RadianceTerms {
+  double emission_w_m2_sr = 0.0;    ///< of the surface
+  double sky_w_m2_sr = 0.0;         ///< reflected
+  double neighbours_w_m2_sr = 0.0;  ///< reflected: bodies, ground and surroundings that it sees
+  double sun_w_m2_sr = 0.0;         ///< reflected
+  double path_w_m2_sr = 0.0;        ///< of the air in between; the sky itself where it is seen
+  double emissivity_frac = 0.0;
+  double air_frac = 1.0;      ///< transmittance for emission and for what is reflected
+  double air_sun_frac = 1.0;  ///< transmittance for reflected sunlight
+
+  [[nodiscard]] double sum_w_m2_sr() const noexcept {
+    return emission_w_m2_sr + sky_w_m2_sr + neighbours_w_m2_sr + sun_w_m2_sr + path_w_m2_sr;
+  }
 };
 
 /// State of a thermal sample at the thermal instant of the latest frame.
@@ -289,6 +312,13 @@ class Renderer {
   /// Reads a sample. RT-safe.
   /// @pre nearest_sample() returned the number.
   [[nodiscard]] virtual SampleReading sample_reading(std::uint32_t sample) const noexcept = 0;
+
+  /// Splits the radiance of a pixel of the latest frame by band. `normal_up` is the vertical
+  /// component of the unit normal that it shows. Setup only.
+  /// @pre The frame has temperature, depth, sun, sky and terms, full quality and no small targets.
+  [[nodiscard]] virtual std::vector<RadianceTerms> radiance_terms(const FrameView& view,
+                                                                  const glm::uvec2& px,
+                                                                  double normal_up) const = 0;
 
   /// Figures of the scene. They grow in warm_up().
   [[nodiscard]] virtual const SceneStats& scene_stats() const noexcept = 0;

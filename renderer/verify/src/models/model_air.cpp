@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -25,6 +26,20 @@ using physics::BandAir;
 using physics::CsvTable;
 using physics::ErrorCode;
 using physics::Result;
+
+/// Air of a flat band, by its limits in um: "3-5".
+Result<BandAir> air_of(std::string_view band) {
+  double lo_um = 0.0;
+  double hi_um = 0.0;
+  const char* end = band.data() + band.size();
+  const auto low = std::from_chars(band.data(), end, lo_um);
+  const bool dash = low.ec == std::errc{} && low.ptr != end && *low.ptr == '-';
+  const auto high = dash ? std::from_chars(low.ptr + 1, end, hi_um) : low;
+  if (!dash || high.ec != std::errc{} || high.ptr != end) {
+    return physics::make_error(ErrorCode::parse, "a band is two wavelengths in um, as 3-5");
+  }
+  return BandAir::build({lo_um, hi_um, {}});
+}
 
 /// Air and band of every row of a table with the columns model, vis_km and band.
 class AirRows {
@@ -50,8 +65,8 @@ class AirRows {
       }
       const std::string band((*bands)[i]);
       if (!out.bands_.contains(band)) {
-        auto terms = BandAir::find(band);
-        if (!terms) return fault(table, i, "band", band, "no band of the built-in air");
+        auto terms = air_of(band);
+        if (!terms) return fault(table, i, "band", band, terms.error().text);
         out.bands_.emplace(band, std::move(*terms));
       }
       out.rows_.push_back({&out.columns_.at(column_key), &out.bands_.at(band)});

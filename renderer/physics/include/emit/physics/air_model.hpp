@@ -8,12 +8,14 @@
 #include <vector>
 
 #include "emit/physics/error.hpp"
+#include "emit/physics/planck.hpp"
 
-/// Air of the model atmospheres in the built-in bands: transmittance and thermal path radiance
-/// between two heights, the clear sky by elevation, and the sun at a height (physics.md eq. 37 and
-/// 38). Absorbers are added up along the path; each band is a sum of exponential terms in their
-/// amounts. Clouds, rain and scattered sunlight are not part of it.
-/// Any thread after construction.
+/// Air of the model atmospheres in a band: transmittance and thermal path radiance between two
+/// heights, the clear sky by elevation, and the sun at a height (physics.md eq. 37 and 38).
+/// Absorbers are added up along the path, and a band is a sum of exponential terms in their
+/// amounts. The flat bands 3-5, 3.4-4.1, 8-12 and 7.7-9.3 um have ten terms of their own. All
+/// others are made of narrow pieces of the spectrum with four terms each. Clouds, rain and
+/// scattered sunlight are not part of it. Any thread after construction.
 namespace emit::physics {
 
 /// Model atmospheres (Anderson et al. 1986).
@@ -40,7 +42,9 @@ enum class AirClimate : std::uint8_t {
 [[nodiscard]] double saturated_vapour_g_m3(double kelvin) noexcept;
 
 inline constexpr std::size_t kAirAbsorbers = 10;
-inline constexpr std::size_t kAirTerms = 10;
+/// Wavelengths that the model knows, um.
+inline constexpr double kAirShortestUm = 2.0;
+inline constexpr double kAirLongestUm = 100.0 / 7.0;
 /// Heights that the model knows, from sea level to the end of the air, m.
 inline constexpr double kAirTopM = 100000.0;
 
@@ -127,12 +131,14 @@ class AirPath {
 enum class AirSource : std::uint8_t { black_300k, black_800k, sun_5772k, flat, sun_lowtran };
 inline constexpr std::size_t kAirSources = 5;
 
-/// Terms of one built-in band.
+/// Air in one band.
 class BandAir {
  public:
-  /// Returns the terms of the band of that name ("3-5", "3.4-4.1", "8-12", "7.7-9.3"), or nothing.
-  /// Setup only.
-  [[nodiscard]] static std::optional<BandAir> find(std::string_view band);
+  /// True if the response of a band is zero wherever the model knows no air.
+  [[nodiscard]] static bool covers(const Band& band) noexcept;
+  /// Makes the air of a band with a response of any shape. Setup only: some milliseconds.
+  /// Errors: invalid_argument if the band does not pass validate() or is not covered.
+  [[nodiscard]] static Result<BandAir> build(const Band& band);
 
   /// Returns the transmittance of a path for radiation with the spectrum of `source`. RT-safe.
   [[nodiscard]] double transmittance(const AirPath& path, AirSource source) const noexcept {
@@ -156,21 +162,24 @@ class BandAir {
   [[nodiscard]] Sight<Sources, Airs> evaluate(
       const AirPath& path, const std::array<AirSource, Sources>& sources,
       const std::array<double, Airs>& warmer_k) const noexcept {
-    Sight<Sources, Airs> out;
-    Terms passed;
-    passed.fill(1.0);
+    std::array<std::array<Warmth, Airs>, AirPath::kMaxStretches> warmths;
     for (std::size_t i = 0; i < path.size(); ++i) {
-      const Terms before = passed;
-      pass(path[i], passed);
-      for (std::size_t a = 0; a < Airs; ++a) {
-        const double warmth =
-            warmer_k[a] == 0.0 ? 0.0 : warmer_k[a] * warmth_frac(path[i].height_m);
-        out.path_radiance_w_m2_sr[a] += emitted_w_m2_sr(path[i].kelvin + warmth, before, passed);
-      }
+      for (std::size_t a = 0; a < Airs; ++a) warmths[i][a] = warmth_of(path[i], warmer_k[a]);
     }
-    for (std::size_t s = 0; s < Sources; ++s) {
-      for (std::size_t t = 0; t < kAirTerms; ++t) {
-        out.transmittance_frac[s] += weight_[static_cast<std::size_t>(sources[s])][t] * passed[t];
+    // Follow the path term by term, until nothing more of it is seen.
+    Sight<Sources, Airs> out;
+    for (std::size_t t = 0; t < terms_.size(); ++t) {
+      const Term& term = terms_[t];
+      double before = 1.0;
+      for (std::size_t i = 0; i < path.size() && before > kUnseenFrac; ++i) {
+        const double after = before * through(term, path[i]);
+        for (std::size_t a = 0; a < Airs; ++a) {
+          out.path_radiance_w_m2_sr[a] += emission_w_m2_sr(t, warmths[i][a]) * (before - after);
+        }
+        before = after;
+      }
+      for (std::size_t s = 0; s < Sources; ++s) {
+        out.transmittance_frac[s] += term.share_frac[static_cast<std::size_t>(sources[s])] * before;
       }
     }
     return out;
@@ -185,17 +194,32 @@ class BandAir {
   static constexpr double kWarmthScaleM = 2000.0;
 
  private:
-  using Terms = std::array<double, kAirTerms>;
-  /// Multiplies `passed` by the transmittance of a stretch, by term.
-  void pass(const AirPath::Stretch& stretch, Terms& passed) const noexcept;
-  /// Returns what a stretch at a temperature emits, by the transmittances at its two ends.
-  [[nodiscard]] double emitted_w_m2_sr(double kelvin, const Terms& before,
-                                       const Terms& after) const noexcept;
-  [[nodiscard]] static double warmth_frac(double height_m) noexcept;
-  std::array<std::array<double, kAirAbsorbers>, kAirTerms> extinction_{};
-  std::array<Terms, kAirSources> weight_{};
+  static constexpr double kUnseenFrac = 1e-9;
+  static constexpr std::size_t kEmissionNodes = 111;
+  struct Term {
+    std::array<double, kAirAbsorbers> extinction{};
+    std::array<double, kAirSources> share_frac{};  ///< of the term in the band, by source
+  };
+  /// Place of a temperature in the table of emission.
+  struct Warmth {
+    std::size_t node;
+    double fraction;
+  };
+  /// Adds a term; `emission` returns what its air emits at a temperature.
+  template <class Emission>
+  void add_term(const Term& term, Emission emission);
+  void add_spectrum(const Band& band);
+  /// Returns the transmittance of a stretch.
+  [[nodiscard]] static double through(const Term& term, const AirPath::Stretch& stretch) noexcept;
+  [[nodiscard]] static Warmth warmth_of(const AirPath::Stretch& stretch, double warmer_k) noexcept;
+  /// Returns the radiance of opaque air in the share of a term.
+  [[nodiscard]] double emission_w_m2_sr(std::size_t term, const Warmth& warmth) const noexcept {
+    const double* node = &emission_[term * kEmissionNodes + warmth.node];
+    return node[0] + warmth.fraction * (node[1] - node[0]);
+  }
+  std::vector<Term> terms_;
+  std::vector<double> emission_;  ///< by term and temperature, W m-2 sr-1
   double sun_w_m2_ = 0.0;
-  std::vector<Terms> emission_;  ///< by temperature: weight of the term times Planck radiance
 };
 
 }  // namespace emit::physics

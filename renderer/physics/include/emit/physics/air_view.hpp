@@ -90,6 +90,13 @@ struct AirSight {
   std::array<float, 3> transmittance_frac;  ///< by source
   float path_radiance_w_m2_sr = 0.0F;
 };
+/// Looks up the node of a line of sight of `range_m` to a target at a height above sea level, in
+/// float32 as the shader does. RT-safe.
+/// @pre table.size() == AirView::kNodes
+[[nodiscard]] AirView::Node air_sight_node(std::span<const AirView::Node> table, float target_m,
+                                           float range_m) noexcept;
+/// Returns the path radiance of a line of sight from its node, W m-2 sr-1. RT-safe.
+[[nodiscard]] float air_path_w_m2_sr(const AirView::Node& node, float range_m) noexcept;
 /// Looks up a line of sight of `range_m` to a target at a height above sea level, in float32 as the
 /// shader does. RT-safe.
 /// @pre table.size() == AirView::kNodes

@@ -34,6 +34,9 @@ struct Band {
 /// Errors: invalid_argument, naming the point.
 [[nodiscard]] Result<void> validate(const Band& band);
 
+/// Returns the response of a band at a wavelength, 0..1.
+[[nodiscard]] double response_frac(const Band& band, double wavelength_um) noexcept;
+
 /// Radiance L of a blackbody in a band, and its derivative.
 struct BandRadiance {
   double radiance_w_m2_sr = 0.0;      ///< L; 0 where it underflows double

@@ -31,6 +31,8 @@ struct SpectralBand {
   double hi_um = 0.0;
   std::vector<ResponseSample> response;  ///< ascending in wavelength, linear in between
 };
+/// Returns a band as the radiometric models take it.
+[[nodiscard]] physics::Band spectral_band(const SpectralBand& desc);
 
 /// One layer of a body under its surface.
 struct Layer {

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tool/offline/explain_command.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "emit/physics/apparent_temperature.hpp"
+#include "tool/command_line/common_options.hpp"
+#include "tool/offline/explain_report.hpp"
+#include "tool/offline/offline_frames.hpp"
+#include "tool/offline/probe_points.hpp"
+#include "tool/offline/probe_run.hpp"
+#include "tool/report/html_page.hpp"
+#include "tool/support/console.hpp"
+#include "tool/support/interrupt.hpp"
+#include "tool/support/json.hpp"
+#include "tool/support/scenario_input.hpp"
+
+namespace emit::tool {
+namespace {
+
+using physics::Result;
+
+struct ExplainOptions {
+  ScenarioChoice input;
+  double time_s = 0.0;
+  std::string px;
+  double hours = 24.0;
+  std::optional<std::filesystem::path> json;
+  std::optional<std::filesystem::path> html;
+  int gpu_index = -1;
+};
+
+/// Renders the pixel and splits its radiance.
+Result<void> explain_frame(const scene::ScenarioDesc& scenario, const ProbeFinder& finder,
+                           const ProbePoint& pixel, const ExplainOptions& command,
+                           Explanation& found, std::optional<ProbePlace>& place) {
+  std::vector<OfflineShot> shots = sensor_shots(scenario, std::span(&command.time_s, 1));
+  shots[0].window_px = {pixel.x_px, pixel.y_px, 1, 1};
+  place = finder.place(pixel, shots[0].sim_time_ns, shots[0].sensor_pose);
+  renderer::OutputOptions output;
+  output.temperature = output.depth = output.object = output.sun = output.sky = output.terms = true;
+  output.slots = 2;
+  auto frames = OfflineFrames::create(scenario, shots, output, command.gpu_index);
+  if (!frames) return tl::unexpected(std::move(frames.error()));
+  const auto next = (*frames)->next();
+  if (!next) return tl::unexpected(next.error());
+  const renderer::FrameView& view = **next;
+  const std::size_t i = std::size_t{pixel.y_px} * view.width_px + pixel.x_px;
+  if (std::isfinite(view.depth_m[i])) {
+    ExplainedSurface surface;
+    surface.object = scenario.objects[static_cast<std::size_t>(view.object_id[i]) - 1].name;
+    surface.material = finder.material_name(static_cast<std::size_t>(view.material[i]));
+    const glm::dvec3 ray =
+        shots[0].sensor_pose.world_from_body *
+        pixel_direction_body(scenario.sensor, pixel.x_px, pixel.y_px);
+    const glm::dvec3 boresight = shots[0].sensor_pose.world_from_body * glm::dvec3(1.0, 0.0, 0.0);
+    surface.range_m = static_cast<double>(view.depth_m[i]) / glm::dot(ray, boresight);
+    surface.position_m = shots[0].sensor_pose.position_world_m + surface.range_m * ray;
+    if (place) surface.normal = place->normal;
+    surface.temperature_k = static_cast<double>(view.temperature_k[i]);
+    surface.sky_frac = static_cast<double>(view.sky_frac[i]);
+    surface.sun_cosine = static_cast<double>(view.sun_cosine[i]);
+    found.surface = surface;
+  }
+  const std::vector<renderer::RadianceTerms> terms = (*frames)->renderer().radiance_terms(
+      view, found.px, found.surface ? found.surface->normal.z : 1.0);
+  for (std::size_t b = 0; b < scenario.bands.size(); ++b) {
+    const float pixel_w_m2_sr = view.radiance_w_m2_sr[b][i];
+    const physics::ApparentTemperature apparent(scene::spectral_band(scenario.bands[b]));
+    found.bands.push_back({scenario.bands[b].name, static_cast<double>(pixel_w_m2_sr),
+                           static_cast<double>(apparent.k(pixel_w_m2_sr)), terms[b]});
+    constexpr double kSameFrac = 1e-4;
+    if (std::abs(terms[b].sum_w_m2_sr() - static_cast<double>(pixel_w_m2_sr)) >
+        kSameFrac * std::abs(static_cast<double>(pixel_w_m2_sr))) {
+      warn(fmt::format("band '{}': the terms add up to {:.6g}, the pixel holds {:.6g} W m-2 sr-1",
+                       scenario.bands[b].name, terms[b].sum_w_m2_sr(), pixel_w_m2_sr));
+    }
+  }
+  return {};
+}
+
+Result<Explanation> explain(const ExplainOptions& command, scene::ScenarioDesc scenario) {
+  const InterruptGuard interrupt;
+  const auto finder = ProbeFinder::create(scenario);
+  if (!finder) return tl::unexpected(finder.error());
+  const auto points = finder->read("px:" + command.px);
+  if (!points) return tl::unexpected(physics::Error(points.error()).with_context("--px"));
+  const ProbePoint& pixel = points->front();
+  // A pixel of a small target is a mean over many samples, so they are drawn like all others.
+  if (scenario.sensor.small_target_px > 0.0) {
+    scenario.sensor.small_target_px = 0.0;
+    if (std::ranges::any_of(scenario.objects, [](const scene::ObjectDesc& object) {
+          return object.entity_id != 0;
+        })) {
+      warn("small targets are drawn with one sample per pixel here (sensor.small_target_px = 0)");
+    }
+  }
+  Explanation found{scenario.name, scenario.epoch_utc_ns, command.time_s,
+                    {pixel.x_px, pixel.y_px}};
+  std::optional<ProbePlace> place;
+  if (auto done = explain_frame(scenario, *finder, pixel, command, found, place); !done) {
+    return tl::unexpected(std::move(done.error()));
+  }
+  if (!place || command.hours <= 0.0) return found;
+  // Read the history of the place on its body.
+  constexpr int kSteps = 48;
+  std::vector<double> times_s;
+  for (int i = 0; i <= kSteps; ++i) {
+    times_s.push_back(command.time_s - 3600.0 * command.hours * (1.0 - double{1} * i / kSteps));
+  }
+  ProbeRun run(scenario, std::move(times_s),
+               {finder->follow(*place, std::llround(1e9 * command.time_s), pixel.name)});
+  if (auto done = run.run(*finder, command.gpu_index); !done) {
+    return tl::unexpected(std::move(done.error()));
+  }
+  found.history = std::move(run);
+  return found;
+}
+
+int run(const ExplainOptions& command) {
+  const auto scenario = load_scenario_choice(command.input);
+  if (!scenario) return fail_config(scenario.error());
+  const auto found = explain(command, *scenario);
+  if (!found) return fail_call(found.error());
+  fmt::print(text_stream(command.json), "{}", explain_text(*found));
+  if (command.json) {
+    if (auto done = write_json(*command.json, explain_json(*found)); !done) {
+      return fail(done.error());
+    }
+  }
+  if (command.html) {
+    if (auto done = write_html(*command.html, explain_page(*found)); !done) {
+      return fail(done.error());
+    }
+  }
+  return kExitOk;
+}
+
+void add_options(CommandLine& line, ExplainOptions& options) {
+  add_scenario(line, options.input, "scenario");
+  line.option("--time-s", options.time_s, "Simulation time").type_name("S").required();
+  line.option("--px", options.px, "Pixel, from 0,0 at the top left").type_name("X,Y").required();
+  line.option("--hours", options.hours, "Length of the surface's history; 0: none")
+      .in_range(0.0, 240.0)
+      .show_default();
+  add_json(line, options.json);
+  line.output_file("--html", options.html, "Page with the terms and the history");
+  add_gpu(line, options.gpu_index);
+  line.footer(
+      "The terms are emission, what the surface reflects of sky, neighbours (bodies, ground and "
+      "surroundings) and sun, each behind the air, and the path: the air in between. In a pixel of "
+      "the sky the path is the sky. They are computed anew from what the pixel shows, and add up to "
+      "the pixel of emit render.\n"
+      "Example: emit explain block-on-road --time-s 12600 --px 320,256 --html pixel.html");
+}
+
+}  // namespace
+
+void add_explain(CommandLine& tool) {
+  tool.command<ExplainOptions>(
+      {.name = "explain",
+       .text = "Where a pixel's radiance comes from, and how its surface came to its temperature",
+       .example = "emit explain block-on-road --time-s 12600 --px 320,256"},
+      add_options, run);
+}
+
+}  // namespace emit::tool

@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tool/offline/explain_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <functional>
+
+#include "tool/report/html_page.hpp"
+#include "tool/support/console.hpp"
+#include "tool/support/svg_plot.hpp"
+
+namespace emit::tool {
+namespace {
+
+/// A line of blocks as high as the values are between the least and the largest; blanks for NaN.
+std::string sparkline(const std::vector<double>& values, double low, double high) {
+  constexpr std::array<std::string_view, 8> kBlocks{"\u2581", "\u2582", "\u2583", "\u2584",
+                                                    "\u2585", "\u2586", "\u2587", "\u2588"};
+  std::string out;
+  for (const double value : values) {
+    if (std::isnan(value)) {
+      out += ' ';
+      continue;
+    }
+    const double place = high > low ? (value - low) / (high - low) : 0.0;
+    out += kBlocks[static_cast<std::size_t>(std::clamp(place, 0.0, 1.0) * 7.0 + 0.5)];
+  }
+  return out;
+}
+
+std::vector<double> values_of(const ProbeRun& history,
+                              const std::function<double(const ProbeRow&)>& value) {
+  std::vector<double> out;
+  for (const ProbeRow& row : history.rows()) out.push_back(value(row));
+  return out;
+}
+
+std::string history_text(const ProbeRun& history) {
+  const auto line = [&](std::string_view name, std::string_view unit,
+                        const std::function<double(const ProbeRow&)>& value, bool from_zero) {
+    const std::vector<double> values = values_of(history, value);
+    double low = std::numeric_limits<double>::infinity();
+    double high = -low;
+    for (const double v : values) {
+      if (std::isnan(v)) continue;
+      low = std::min(low, v);
+      high = std::max(high, v);
+    }
+    if (!(low <= high)) return fmt::format("  {:<12} no values\n", name);
+    return fmt::format("  {:<12} {}  {:.6g} .. {:.6g} {}\n", name,
+                       sparkline(values, from_zero ? 0.0 : low, high), low, high, unit);
+  };
+  const double hours = (history.times_s().back() - history.times_s().front()) / 3600.0;
+  return fmt::format("history of the surface, last {:g} h\n", hours) +
+         line("temperature", "K", [](const ProbeRow& row) { return row.temperature_k; }, false) +
+         line("sun", "W/m2", [](const ProbeRow& row) { return row.sun_w_m2; }, true) +
+         line("flux inwards", "W/m2", [](const ProbeRow& row) { return row.flux_w_m2; }, false);
+}
+
+/// Cells of a band's table: name, radiance and share of each term, then sum and pixel.
+std::vector<std::vector<std::string>> term_rows(const ExplainedBand& band) {
+  std::vector<std::vector<std::string>> out;
+  const double sum = band.terms.sum_w_m2_sr();
+  for (const auto& [name, value] : named_terms(band.terms)) {
+    out.push_back({std::string(name), fmt::format("{:.6g}", value),
+                   fmt::format("{:.2f} %", sum != 0.0 ? 100.0 * value / sum : 0.0)});
+  }
+  out.push_back({"sum", fmt::format("{:.6g}", sum), ""});
+  out.push_back({"pixel of the frame", fmt::format("{:.6g}", band.pixel_w_m2_sr), ""});
+  return out;
+}
+
+std::string surface_sentence(const Explanation& found) {
+  if (!found.surface) return "It shows the sky.";
+  const ExplainedSurface& s = *found.surface;
+  return fmt::format(
+      "It shows object '{}', material '{}', {:.2f} m away at ({:.3f}, {:.3f}, {:.3f}) m, normal "
+      "({:.3f}, {:.3f}, {:.3f}), {:.3f} K. The face sees {:.1f} % sky and {:.1f} % of the direct "
+      "sun.",
+      s.object, s.material, s.range_m, s.position_m.x, s.position_m.y, s.position_m.z, s.normal.x,
+      s.normal.y, s.normal.z, s.temperature_k, 100.0 * s.sky_frac, 100.0 * s.sun_cosine);
+}
+
+std::string air_sentence(const Explanation& found, const ExplainedBand& band) {
+  if (!found.surface) return fmt::format("Apparent temperature {:.3f} K.", band.apparent_k);
+  return fmt::format(
+      "Apparent temperature {:.3f} K, emissivity {:.4f}, air lets {:.4f} through (sunlight {:.4f}).",
+      band.apparent_k, band.terms.emissivity_frac, band.terms.air_frac, band.terms.air_sun_frac);
+}
+
+std::string headline(const Explanation& found) {
+  return fmt::format("{} at {} (simulation time {:g} s), pixel {},{}", found.scenario,
+                     utc_text(found.epoch_utc_ns, found.time_s), found.time_s, found.px.x,
+                     found.px.y);
+}
+
+}  // namespace
+
+std::array<std::pair<std::string_view, double>, 5> named_terms(
+    const renderer::RadianceTerms& terms) {
+  return {{{"emission", terms.emission_w_m2_sr},
+           {"reflected sky", terms.sky_w_m2_sr},
+           {"reflected neighbours", terms.neighbours_w_m2_sr},
+           {"reflected sun", terms.sun_w_m2_sr},
+           {"path", terms.path_w_m2_sr}}};
+}
+
+std::string utc_text(std::int64_t epoch_utc_ns, double time_s) {
+  const auto seconds = static_cast<std::time_t>(
+      std::floor(1e-9 * static_cast<double>(epoch_utc_ns) + std::round(time_s * 1e3) / 1e3));
+  std::tm parts{};
+  ::gmtime_r(&seconds, &parts);
+  std::array<char, 32> text{};
+  std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &parts);
+  return text.data();
+}
+
+std::string explain_text(const Explanation& found) {
+  std::string out = headline(found) + "\n" + surface_sentence(found) + "\n";
+  for (const ExplainedBand& band : found.bands) {
+    TextTable table({"band " + band.name, "W m-2 sr-1", "share"});
+    for (std::vector<std::string>& row : term_rows(band)) table.add(std::move(row));
+    out += "\n" + table.to_string() + air_sentence(found, band) + "\n";
+  }
+  if (found.history) out += "\n" + history_text(*found.history);
+  return out;
+}
+
+Json explain_json(const Explanation& found) {
+  Json out = Json::object();
+  out.set("scenario", found.scenario).set("utc", utc_text(found.epoch_utc_ns, found.time_s));
+  out.set("sim_time_s", found.time_s);
+  Json px = Json::array();
+  px.push(found.px.x).push(found.px.y);
+  out.set("px", px);
+  const auto vector = [](const glm::dvec3& v) {
+    Json json = Json::array();
+    json.push(v.x).push(v.y).push(v.z);
+    return json;
+  };
+  if (found.surface) {
+    const ExplainedSurface& s = *found.surface;
+    Json surface = Json::object();
+    surface.set("object", s.object).set("material", s.material).set("range_m", s.range_m);
+    surface.set("position_m", vector(s.position_m)).set("normal", vector(s.normal));
+    surface.set("temperature_k", s.temperature_k).set("sky_frac", s.sky_frac);
+    surface.set("sun_cosine", s.sun_cosine);
+    out.set("surface", surface);
+  } else {
+    out.set("surface", nullptr);
+  }
+  Json bands = Json::array();
+  for (const ExplainedBand& band : found.bands) {
+    const renderer::RadianceTerms& t = band.terms;
+    Json terms = Json::object();
+    terms.set("emission_w_m2_sr", t.emission_w_m2_sr).set("sky_w_m2_sr", t.sky_w_m2_sr);
+    terms.set("neighbours_w_m2_sr", t.neighbours_w_m2_sr).set("sun_w_m2_sr", t.sun_w_m2_sr);
+    terms.set("path_w_m2_sr", t.path_w_m2_sr);
+    Json json = Json::object();
+    json.set("band", band.name).set("pixel_w_m2_sr", band.pixel_w_m2_sr);
+    json.set("sum_w_m2_sr", t.sum_w_m2_sr()).set("terms", terms);
+    json.set("apparent_k", band.apparent_k).set("emissivity_frac", t.emissivity_frac);
+    json.set("air_frac", t.air_frac).set("air_sun_frac", t.air_sun_frac);
+    bands.push(json);
+  }
+  out.set("bands", bands);
+  Json history = Json::array();
+  if (found.history) {
+    for (const ProbeRow& row : found.history->rows()) {
+      Json json = Json::object();
+      json.set("sim_time_s", row.time_s).set("temperature_k", row.temperature_k);
+      json.set("sun_w_m2", row.sun_w_m2).set("sky_frac", row.sky_frac);
+      json.set("flux_w_m2", row.flux_w_m2);
+      history.push(json);
+    }
+  }
+  out.set("history", history);
+  return out;
+}
+
+std::string explain_page(const Explanation& found) {
+  constexpr const char* kStyle =
+      "td, th { padding: 3px 18px 3px 0; text-align: right; }\n"
+      "td:first-child, th:first-child { text-align: left; }\n"
+      "th { border-bottom: 2px solid #999; }\n";
+  std::string body = "<p>" + html_escaped(surface_sentence(found)) + "</p>\n";
+  for (const ExplainedBand& band : found.bands) {
+    body += fmt::format(
+        "<h2>{}</h2>\n<table>\n<tr><th>term</th><th>W m<sup>-2</sup> sr<sup>-1</sup></th>"
+        "<th>share</th></tr>\n",
+        html_escaped(band.name));
+    for (const std::vector<std::string>& row : term_rows(band)) {
+      body += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td></tr>\n", row[0], row[1], row[2]);
+    }
+    body += "</table>\n<p>" + html_escaped(air_sentence(found, band)) + "</p>\n";
+  }
+  if (found.history) {
+    std::vector<Plot> plots = found.history->plots();
+    // The histories of radiance are those of a view along the normal, so they are left out.
+    plots.resize(plots.size() - found.bands.size());
+    body += "<h2>History of the surface</h2>\n" + svg_document(plots);
+  }
+  return html_page(headline(found), kStyle, body);
+}
+
+}  // namespace emit::tool

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "emit/renderer/renderer.hpp"
+#include "emit/scene/scene_desc.hpp"
+#include "tool/offline/probe_run.hpp"
+#include "tool/support/json.hpp"
+
+/// What `emit explain` found about a pixel, as text, JSON and page.
+namespace emit::tool {
+
+/// Radiance of a pixel in one band.
+struct ExplainedBand {
+  std::string name;
+  double pixel_w_m2_sr = 0.0;  ///< of the frame
+  double apparent_k = 0.0;     ///< temperature of the blackbody with that radiance
+  renderer::RadianceTerms terms;
+};
+
+/// Surface that the pixel shows.
+struct ExplainedSurface {
+  std::string object;
+  std::string material;
+  glm::dvec3 position_m{0.0};
+  glm::dvec3 normal{0.0};
+  double range_m = 0.0;
+  double temperature_k = 0.0;
+  double sky_frac = 0.0;
+  double sun_cosine = 0.0;  ///< with the visible share of the sun
+};
+
+struct Explanation {
+  std::string scenario;
+  std::int64_t epoch_utc_ns = 0;
+  double time_s = 0.0;
+  glm::uvec2 px{0};
+  std::optional<ExplainedSurface> surface = std::nullopt;  ///< empty: sky
+  std::vector<ExplainedBand> bands{};
+  std::optional<ProbeRun> history = std::nullopt;
+};
+
+/// Terms of a radiance with their names, in the order in which they are shown.
+[[nodiscard]] std::array<std::pair<std::string_view, double>, 5> named_terms(
+    const renderer::RadianceTerms& terms);
+
+[[nodiscard]] std::string explain_text(const Explanation& found);
+[[nodiscard]] Json explain_json(const Explanation& found);
+[[nodiscard]] std::string explain_page(const Explanation& found);
+
+/// Date and time of a simulation time, ISO 8601.
+[[nodiscard]] std::string utc_text(std::int64_t epoch_utc_ns, double time_s);
+
+}  // namespace emit::tool
