@@ -368,6 +368,7 @@ Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
   scenario.atmosphere = resolve_atmosphere(root, scenario, diagnostics);
 
   scenario.materials = resolve_materials(pool.members[0].value.items, known, diagnostics);
+  complete_band_emissivities(scenario.bands, scenario.materials);
   // The renderer gets only bands that a channel shows, and emissivities in those bands.
   std::vector<std::string> handed_over = known_band_names({});
   for (const scene::SpectralBand& band : scenario.bands) {

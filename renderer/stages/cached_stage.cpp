@@ -261,7 +261,8 @@ bool CachedStage::coarse_from(const physics::Pose& camera) const noexcept {
   // only if the scenario has positions of the camera.
   return visibly_simplified_ || surface_->model().full_in_view ||
          surface_->exposure_tiles().short_of_tiles() || surface_->entity_shadows().stale() ||
-         surface_->lags() || !stands_near(refined_eyes_, here, least_cos) ||
+         surface_->lags() || surface_->columns_cut_short() ||
+         !stands_near(refined_eyes_, here, least_cos) ||
          (!detail_eyes_.empty() && !stands_near(detail_eyes_, here, kAnyCosine));
 }
 

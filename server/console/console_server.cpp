@@ -11,15 +11,14 @@
 #include <boost/asio/posix/stream_descriptor.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <chrono>
-#include <cstring>
 #include <exception>
 #include <thread>
 #include <utility>
 
 #include "console/console_message.hpp"
 #include "console/console_session.hpp"
+#include "net/connection_acceptor.hpp"
 #include "net/ip_address.hpp"
-#include "rt/error_text.hpp"
 
 namespace emit::server {
 namespace {
@@ -28,16 +27,8 @@ namespace asio = boost::asio;
 using asio::ip::tcp;
 using boost::system::error_code;
 
-constexpr std::chrono::milliseconds kRetry{100};
 constexpr std::chrono::milliseconds kStatusPeriod{200};
 constexpr int kNice = 10;
-
-SocketAddress address_of(const tcp::endpoint& endpoint) {
-  SocketAddress address;
-  std::memcpy(address.get(), endpoint.data(), endpoint.size());
-  address.length = static_cast<socklen_t>(endpoint.size());
-  return address;
-}
 
 std::string_view name_of(CommandKind command) noexcept {
   switch (command) {
@@ -67,38 +58,10 @@ struct ConsoleServer::Impl {
     hub.pages_changed = [this] { pages_changed(); };
   }
 
-  void open(const SocketAddress& address, error_code& error) {
-    tcp::endpoint endpoint;
-    std::memcpy(endpoint.data(), address.get(), address.length);
-    endpoint.resize(address.length);
-    acceptor.open(endpoint.protocol(), error);
-    if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
-    if (!error) acceptor.bind(endpoint, error);
-    if (!error) acceptor.listen(tcp::acceptor::max_listen_connections, error);
-  }
-
-  void accept() {
-    acceptor.async_accept([this](const error_code& error, tcp::socket socket) {
-      accepting = false;
-      if (error == asio::error::operation_aborted) return;
-      if (error) {
-        // Out of descriptors, and who knocks still waits: asked again after a while.
-        retry.expires_after(kRetry);
-        retry.async_wait([this](const error_code& ended) {
-          accepting = false;
-          if (!ended) accept();
-        });
-        accepting = true;
-        return;
-      }
-      accept();  // first: for this connection there may be no memory
-      error_code gone;
-      const tcp::endpoint peer = socket.remote_endpoint(gone);
-      if (gone || hub.connections >= kMaxConnections || !answers.admits(address_of(peer))) return;
-      const bool local = ip_of(address_of(peer)).is_loopback();
-      std::make_shared<ConsoleSession>(std::move(socket), local, hub)->run();
-    });
-    accepting = true;
+  void take(tcp::socket socket, const SocketAddress& peer) {
+    if (hub.connections >= kMaxConnections || !answers.admits(peer)) return;
+    const bool local = ip_of(peer).is_loopback();
+    std::make_shared<ConsoleSession>(std::move(socket), local, hub)->run();
   }
 
   /// The tap and the timers work only while somebody looks.
@@ -202,7 +165,7 @@ struct ConsoleServer::Impl {
     // A request that there is no memory for ends; the next one gets its chance.
     while (!io.stopped()) {
       try {
-        if (!accepting) accept();
+        acceptor.resume();
         if (!watching) watch_bell();
         io.run();
       } catch (const std::exception&) {
@@ -218,15 +181,13 @@ struct ConsoleServer::Impl {
   ConsoleHub hub;
   std::size_t asked_channel = 0;
   std::uint64_t sequence = 0;
-  bool accepting = false;  ///< or about to, after a while: something will call accept()
   bool watching = false;
   asio::io_context io{1};
-  tcp::acceptor acceptor{io};
-  asio::steady_timer retry{io};
+  ConnectionAcceptor acceptor{
+      io, [this](tcp::socket socket, const SocketAddress& peer) { take(std::move(socket), peer); }};
   asio::steady_timer image_timer{io};
   asio::steady_timer status_timer{io};
   asio::posix::stream_descriptor bell{io};
-  SocketAddress bound;
   std::thread thread;
 };
 
@@ -239,15 +200,10 @@ physics::Result<std::unique_ptr<ConsoleServer>> ConsoleServer::start(const Socke
                                                                      Options options) {
   try {
     auto impl = std::make_unique<Impl>(context, tap, std::move(answers), std::move(options));
-    error_code error;
-    impl->open(address, error);
-    if (error) {
-      return physics::make_error(physics::ErrorCode::io,
-                                 to_string(address) + ": " + bind_error_text(error.value()));
+    if (auto opened = impl->acceptor.open(address); !opened) {
+      return tl::unexpected(std::move(opened.error()));
     }
     impl->bell.assign(::dup(context.bells.console.fd()));
-    impl->bound = address_of(impl->acceptor.local_endpoint());
-    impl->accept();
     impl->thread = std::thread([raw = impl.get()] { raw->run(); });
     return std::unique_ptr<ConsoleServer>(new ConsoleServer(std::move(impl)));
   } catch (const std::exception& error) {
@@ -264,7 +220,7 @@ ConsoleServer::~ConsoleServer() {
 }
 
 SocketAddress ConsoleServer::address() const noexcept {
-  return impl_->bound;
+  return impl_->acceptor.address();
 }
 
 }  // namespace emit::server

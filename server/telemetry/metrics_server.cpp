@@ -3,7 +3,6 @@
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
-#include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http/empty_body.hpp>
@@ -12,12 +11,11 @@
 #include <boost/beast/http/string_body.hpp>
 #include <boost/beast/http/write.hpp>
 #include <chrono>
-#include <cstring>
 #include <exception>
 #include <thread>
 #include <utility>
 
-#include "rt/error_text.hpp"
+#include "net/connection_acceptor.hpp"
 
 namespace emit::server {
 namespace {
@@ -108,54 +106,16 @@ class Session : public std::enable_shared_from_this<Session> {
 struct MetricsServer::Impl {
   explicit Impl(Answers given) : answers(std::move(given)) {}
 
-  void open(const SocketAddress& address, error_code& error) {
-    tcp::endpoint endpoint;
-    std::memcpy(endpoint.data(), address.get(), address.length);
-    endpoint.resize(address.length);
-    acceptor.open(endpoint.protocol(), error);
-    if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
-    if (!error) acceptor.bind(endpoint, error);
-    if (!error) acceptor.listen(tcp::acceptor::max_listen_connections, error);
-  }
-
-  void accept() {
-    acceptor.async_accept([this](const error_code& error, tcp::socket socket) {
-      accepting = false;
-      if (error == asio::error::operation_aborted) return;
-      if (error) {
-        // Out of descriptors, and who knocks still waits: asked again after a while.
-        retry.expires_after(kRetry);
-        retry.async_wait([this](const error_code& ended) {
-          accepting = false;
-          if (!ended) accept();
-        });
-        accepting = true;
-        return;
-      }
-      accept();  // first: for this connection there may be no memory
-      if (sessions < kMaxConnections && admits(socket)) {
-        std::make_shared<Session>(std::move(socket), answers, sessions)->run();
-      }
-    });
-    accepting = true;
-  }
-
-  bool admits(const tcp::socket& socket) const {
-    error_code error;
-    const tcp::endpoint peer = socket.remote_endpoint(error);
-    SocketAddress address;
-    std::memcpy(address.get(), peer.data(), peer.size());
-    address.length = static_cast<socklen_t>(peer.size());
-    return !error && answers.admits(address);
+  void take(tcp::socket socket, const SocketAddress& peer) {
+    if (sessions >= kMaxConnections || !answers.admits(peer)) return;
+    std::make_shared<Session>(std::move(socket), answers, sessions)->run();
   }
 
   void run() noexcept {
     // A request that there is no memory for ends; the next one gets its chance.
     while (!context.stopped()) {
       try {
-        if (!accepting) {
-          accept();
-        }
+        acceptor.resume();
         context.run();
       } catch (const std::exception&) {
         continue;
@@ -163,15 +123,12 @@ struct MetricsServer::Impl {
     }
   }
 
-  static constexpr std::chrono::milliseconds kRetry{100};
-
   const Answers answers;
   int sessions = 0;
-  bool accepting = false;  ///< or about to, after a while: something will call accept()
   asio::io_context context{1};
-  tcp::acceptor acceptor{context};
-  asio::steady_timer retry{context};
-  SocketAddress bound;
+  ConnectionAcceptor acceptor{context, [this](tcp::socket socket, const SocketAddress& peer) {
+                                take(std::move(socket), peer);
+                              }};
   std::thread thread;
 };
 
@@ -181,16 +138,9 @@ physics::Result<std::unique_ptr<MetricsServer>> MetricsServer::start(const Socke
                                                                      Answers answers) {
   try {
     auto impl = std::make_unique<Impl>(std::move(answers));
-    error_code error;
-    impl->open(address, error);
-    if (error) {
-      return physics::make_error(physics::ErrorCode::io,
-                                 to_string(address) + ": " + bind_error_text(error.value()));
+    if (auto opened = impl->acceptor.open(address); !opened) {
+      return tl::unexpected(std::move(opened.error()));
     }
-    const tcp::endpoint bound = impl->acceptor.local_endpoint();
-    std::memcpy(impl->bound.get(), bound.data(), bound.size());
-    impl->bound.length = static_cast<socklen_t>(bound.size());
-    impl->accept();
     impl->thread = std::thread([raw = impl.get()] { raw->run(); });
     return std::unique_ptr<MetricsServer>(new MetricsServer(std::move(impl)));
   } catch (const std::exception& error) {
@@ -204,7 +154,7 @@ MetricsServer::~MetricsServer() {
 }
 
 SocketAddress MetricsServer::address() const noexcept {
-  return impl_->bound;
+  return impl_->acceptor.address();
 }
 
 }  // namespace emit::server

@@ -222,9 +222,9 @@ const std::vector<Case>& cases() {
       {"response_above_one", "[[band]]\nname = \"w\"\nresponse = [[3, 1], [4, 1.5]]\n",
        "s.toml:4:12: the response at 4 um is 1.5, must be 0 .. 1"},
       {"band_without_atmosphere",
-       "[[band]]\nname = \"w\"\nlo_um = 4\nhi_um = 5\n[[channel]]\nname = \"c\"\nband = \"w\"\n",
+       "[[band]]\nname = \"w\"\nlo_um = 1\nhi_um = 5\n[[channel]]\nname = \"c\"\nband = \"w\"\n",
        "s.toml:2:1: band 'w' has no atmosphere: add an [[atmosphere.band]] for it or set "
-       "atmosphere.enabled = false"},
+       "atmosphere.enabled = false (the built-in air covers 2 to 14.29 um)"},
       {"atmosphere_sum", "[[atmosphere.band]]\nband = \"3-5\"\nterms = [[0.5, 0.1], [0.4, 1]]\n",
        "s.toml:4:9: the amplitudes of 'terms' add up to 0.9, must be 1"},
       {"display", "[display]\nmin_k = 300\nmax_k = 290\n",

@@ -261,5 +261,50 @@ TEST_F(ConfigTest, built_in_atmosphere_meets_the_tabulated_transmittance) {
   EXPECT_NEAR(tau(mwir, 5.0), 0.208, 0.017);
 }
 
+TEST_F(ConfigTest, own_bands_take_the_emissivity_of_the_listed_band_that_is_most_like_them) {
+  const auto loaded = scenario(
+      "[[band]]\nname = \"wide\"\nlo_um = 3.7\nhi_um = 4.8\n"
+      "[[band]]\nname = \"narrow\"\nlo_um = 8\nhi_um = 9\n"
+      "[[band]]\nname = \"apart\"\nlo_um = 2\nhi_um = 2.5\n"
+      "[[band]]\nname = \"stated\"\nlo_um = 3.7\nhi_um = 4.8\n"
+      "[[channel]]\nname = \"a\"\nband = \"wide\"\n[[channel]]\nname = \"b\"\nband = \"narrow\"\n"
+      "[[channel]]\nname = \"c\"\nband = \"apart\"\n[[channel]]\nname = \"d\"\nband = \"stated\"\n"
+      "[[material]]\nname = \"m\"\nsolar_absorptance_frac = 0.5\nemissivity_frac = 0.9\n"
+      "prescribed_k = 300\n"
+      "band_emissivity_frac = { \"3-5\" = 0.8, \"3.4-4.1\" = 0.7, \"8-12\" = 0.6, \"7.7-9.3\" = "
+      "0.5, "
+      "\"stated\" = 0.4 }\n");
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
+  const auto material = std::ranges::find(loaded->materials, "m", &scene::Material::name);
+  ASSERT_NE(material, loaded->materials.end());
+  const auto emissivity_frac = [&](std::string_view band) {
+    const auto entry =
+        std::ranges::find(material->band_emissivity, band, &scene::BandEmissivity::band);
+    return entry == material->band_emissivity.end() ? material->emissivity_frac
+                                                    : entry->emissivity_frac;
+  };
+  EXPECT_EQ(emissivity_frac("wide"), 0.8);
+  EXPECT_EQ(emissivity_frac("narrow"), 0.5);
+  EXPECT_EQ(emissivity_frac("apart"), 0.9);
+  EXPECT_EQ(emissivity_frac("stated"), 0.4);
+}
+
+TEST_F(ConfigTest, own_bands_have_built_in_air_where_it_reaches) {
+  const auto bands = [&](const std::string& limits) {
+    return scenario("[[band]]\nname = \"own\"\n" + limits +
+                    "[[channel]]\nname = \"c\"\nband = \"own\"\n");
+  };
+  const auto flat = bands("lo_um = 3.7\nhi_um = 4.8\n");
+  ASSERT_TRUE(flat.has_value()) << flat.error().text;
+  ASSERT_EQ(flat->atmosphere.bands.size(), 1U);
+  EXPECT_TRUE(flat->atmosphere.bands[0].model.has_value());
+  const auto response = bands("response = [[7.5, 0], [8.5, 1], [12, 1], [14, 0]]\n");
+  ASSERT_TRUE(response.has_value()) << response.error().text;
+  EXPECT_TRUE(response->atmosphere.bands[0].model.has_value());
+  // A response that reaches beyond is cut by the limits of its band.
+  EXPECT_FALSE(bands("response = [[7.5, 0], [8.5, 1], [12, 1], [15, 0]]\n").has_value());
+  EXPECT_TRUE(bands("hi_um = 14\nresponse = [[7.5, 0], [8.5, 1], [12, 1], [15, 0]]\n").has_value());
+}
+
 }  // namespace
 }  // namespace emit::config::testing

@@ -335,7 +335,7 @@ const KeyTable<AtmosphereDraft>& atmosphere_keys() {
               {"us_standard", "us_standard"},
               {"none", "none"}},
           EMIT_FIELD(model),
-          "Climate of the built-in bands' air (see Built-in air). With `none` only `file` and "
+          "Climate of the built-in air (see Built-in air). With `none` only `file` and "
           "`[[atmosphere.band]]` count."),
       number<AtmosphereDraft>("visibility_km", "km", between(2, 50), EMIT_FIELD(visibility_km),
                               "Visibility in the haze of the built-in air."),

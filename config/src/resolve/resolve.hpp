@@ -36,6 +36,11 @@ void check_channels(const Node& root, const scene::ScenarioDesc& scenario, bool 
 [[nodiscard]] std::vector<scene::SpectralBand> bands_in_use(
     const std::vector<scene::ChannelDesc>& channels,
     const std::vector<scene::SpectralBand>& declared);
+/// Gives materials an emissivity in bands that they do not list: that of the listed built-in band
+/// that is most like it, by overlap over union. A band that overlaps none keeps the material's
+/// total emissivity.
+void complete_band_emissivities(const std::vector<scene::SpectralBand>& bands,
+                                std::vector<scene::Material>& materials);
 /// The air of the bands of `scenario`. Place, date and weather of the scenario are those of the
 /// built-in air.
 [[nodiscard]] scene::AtmosphereDesc resolve_atmosphere(const Node& root,

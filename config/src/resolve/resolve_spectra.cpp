@@ -355,6 +355,34 @@ void check_inline_atmosphere(const Node& node, const BandAtmosphere& entry,
 
 }  // namespace
 
+void complete_band_emissivities(const std::vector<SpectralBand>& bands,
+                                std::vector<scene::Material>& materials) {
+  for (scene::Material& material : materials) {
+    const std::vector<scene::BandEmissivity> listed_bands = material.band_emissivity;
+    for (const SpectralBand& band : bands) {
+      double most = 0.0;
+      double emissivity_frac = material.emissivity_frac;
+      for (const scene::BandEmissivity& entry : listed_bands) {
+        const auto named = [&entry](const SpectralBand& known) { return known.name == entry.band; };
+        const auto known = std::ranges::find_if(built_in_bands(), named);
+        double likeness = 2.0;  // the band itself is listed
+        if (entry.band != band.name) {
+          if (known == built_in_bands().end()) continue;
+          const double both_um =
+              std::min(band.hi_um, known->hi_um) - std::max(band.lo_um, known->lo_um);
+          likeness =
+              both_um / (std::max(band.hi_um, known->hi_um) - std::min(band.lo_um, known->lo_um));
+        }
+        if (likeness <= most) continue;
+        most = likeness;
+        emissivity_frac = entry.emissivity_frac;
+      }
+      if (most > 0.0 && most <= 1.0)
+        material.band_emissivity.push_back({band.name, emissivity_frac});
+    }
+  }
+}
+
 scene::AtmosphereDesc resolve_atmosphere(const Node& root, const scene::ScenarioDesc& scenario,
                                          Diagnostics& diagnostics) {
   const std::vector<SpectralBand>& bands = scenario.bands;

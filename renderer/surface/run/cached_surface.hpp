@@ -117,6 +117,12 @@ class CachedSurface {
   }
   /// Returns true while some samples lack a change of the weather by the host that matters.
   [[nodiscard]] bool lags() const noexcept { return lags_; }
+  /// Returns true while heat between columns is off by more than kMostColumnErrorK, because its
+  /// solution was cut short.
+  [[nodiscard]] bool columns_cut_short() const noexcept {
+    return interval_.columns_left_k() > kMostColumnErrorK;
+  }
+  static constexpr double kMostColumnErrorK = 0.05;
   /// Number of blocks of samples that do not follow the intervals, because the host moves an
   /// entity. @pre prepare()
   [[nodiscard]] std::size_t local_blocks() const noexcept {

@@ -108,6 +108,11 @@ void ColumnSolve::end_pass() noexcept {
       return !(left.most_k > ColumnSystem::kSolvedK && left.size > 0.0);
     });
     pass_ = active_.empty() || steps_++ == kMostSteps ? Pass::keep : Pass::turn;
+    if (pass_ != Pass::keep) return;
+    left_k_ = 0.0;
+    for (const std::uint32_t c : active_) {
+      left_k_ = std::max(left_k_, static_cast<double>(left_[system_.island(c)].most_k));
+    }
   };
   switch (pass_) {
     case Pass::residual:

@@ -54,6 +54,8 @@ class ColumnSolve {
   void start(const SurfaceNode& from, const Holds& holds) noexcept;
   [[nodiscard]] bool started() const noexcept { return pass_ != Pass::none; }
   [[nodiscard]] bool finished() const noexcept { return pass_ == Pass::finished; }
+  /// Largest error that the latest solution left when its steps were used up, K; 0: it was solved.
+  [[nodiscard]] double left_k() const noexcept { return left_k_; }
   /// Columns that work() has visited since start(), over all passes.
   [[nodiscard]] std::size_t worked() const noexcept { return worked_; }
   /// Continues the solution by `count` columns in its passes. The last pass writes to `to`: cells,
@@ -94,6 +96,7 @@ class ColumnSolve {
   std::vector<float> change_k_s_;          ///< by column: change by neighbours, interval before
   std::vector<std::uint8_t> stepped_again_;
   double dt_s_ = 1.0;
+  double left_k_ = 0.0;
   int steps_ = 0;
   std::size_t at_ = 0;      ///< columns that the pass has done
   std::size_t worked_ = 0;  ///< columns in all passes

@@ -88,6 +88,10 @@ class SurfaceInterval {
   [[nodiscard]] std::span<std::uint8_t> stepped_again() noexcept {
     return columns_->stepped_again();
   }
+  /// See ColumnSolve::left_k().
+  [[nodiscard]] double columns_left_k() const noexcept {
+    return columns_ ? columns_->left_k() : 0.0;
+  }
   /// Main memory for the columns, in bytes.
   [[nodiscard]] std::uint64_t bytes() const noexcept {
     return columns_ ? columns_->bytes() + bands_->bytes() : 0;

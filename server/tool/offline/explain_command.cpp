@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -57,9 +58,8 @@ Result<void> explain_frame(const scene::ScenarioDesc& scenario, const ProbeFinde
     ExplainedSurface surface;
     surface.object = scenario.objects[static_cast<std::size_t>(view.object_id[i]) - 1].name;
     surface.material = finder.material_name(static_cast<std::size_t>(view.material[i]));
-    const glm::dvec3 ray =
-        shots[0].sensor_pose.world_from_body *
-        pixel_direction_body(scenario.sensor, pixel.x_px, pixel.y_px);
+    const glm::dvec3 ray = shots[0].sensor_pose.world_from_body *
+                           pixel_direction_body(scenario.sensor, pixel.x_px, pixel.y_px);
     const glm::dvec3 boresight = shots[0].sensor_pose.world_from_body * glm::dvec3(1.0, 0.0, 0.0);
     surface.range_m = static_cast<double>(view.depth_m[i]) / glm::dot(ray, boresight);
     surface.position_m = shots[0].sensor_pose.position_world_m + surface.range_m * ray;
@@ -102,18 +102,20 @@ Result<Explanation> explain(const ExplainOptions& command, scene::ScenarioDesc s
       warn("small targets are drawn with one sample per pixel here (sensor.small_target_px = 0)");
     }
   }
-  Explanation found{scenario.name, scenario.epoch_utc_ns, command.time_s,
-                    {pixel.x_px, pixel.y_px}};
+  Explanation found{scenario.name, scenario.epoch_utc_ns, command.time_s, {pixel.x_px, pixel.y_px}};
   std::optional<ProbePlace> place;
   if (auto done = explain_frame(scenario, *finder, pixel, command, found, place); !done) {
     return tl::unexpected(std::move(done.error()));
   }
-  if (!place || command.hours <= 0.0) return found;
-  // Read the history of the place on its body.
-  constexpr int kSteps = 48;
+  // Read the history of the place on its body, as far back as the surface has one.
+  const double first_s = std::max(command.time_s - 3600.0 * command.hours,
+                                  1e-9 * static_cast<double>(scenario.thermal.history_start_ns));
+  if (!place || first_s >= command.time_s) return found;
+  constexpr double kStepS = 1800.0;
+  const auto steps = static_cast<int>(std::ceil((command.time_s - first_s) / kStepS));
   std::vector<double> times_s;
-  for (int i = 0; i <= kSteps; ++i) {
-    times_s.push_back(command.time_s - 3600.0 * command.hours * (1.0 - double{1} * i / kSteps));
+  for (int i = 0; i <= steps; ++i) {
+    times_s.push_back(std::lerp(first_s, command.time_s, double{1} * i / steps));
   }
   ProbeRun run(scenario, std::move(times_s),
                {finder->follow(*place, std::llround(1e9 * command.time_s), pixel.name)});
@@ -147,7 +149,8 @@ void add_options(CommandLine& line, ExplainOptions& options) {
   add_scenario(line, options.input, "scenario");
   line.option("--time-s", options.time_s, "Simulation time").type_name("S").required();
   line.option("--px", options.px, "Pixel, from 0,0 at the top left").type_name("X,Y").required();
-  line.option("--hours", options.hours, "Length of the surface's history; 0: none")
+  line.option("--hours", options.hours,
+              "Length of the surface's history, at most the scenario's thermal history; 0: none")
       .in_range(0.0, 240.0)
       .show_default();
   add_json(line, options.json);
@@ -156,7 +159,8 @@ void add_options(CommandLine& line, ExplainOptions& options) {
   line.footer(
       "The terms are emission, what the surface reflects of sky, neighbours (bodies, ground and "
       "surroundings) and sun, each behind the air, and the path: the air in between. In a pixel of "
-      "the sky the path is the sky. They are computed anew from what the pixel shows, and add up to "
+      "the sky the path is the sky. They are computed anew from what the pixel shows, and add up "
+      "to "
       "the pixel of emit render.\n"
       "Example: emit explain block-on-road --time-s 12600 --px 320,256 --html pixel.html");
 }

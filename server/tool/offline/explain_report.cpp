@@ -55,9 +55,12 @@ std::string history_text(const ProbeRun& history) {
   };
   const double hours = (history.times_s().back() - history.times_s().front()) / 3600.0;
   return fmt::format("history of the surface, last {:g} h\n", hours) +
-         line("temperature", "K", [](const ProbeRow& row) { return row.temperature_k; }, false) +
-         line("sun", "W/m2", [](const ProbeRow& row) { return row.sun_w_m2; }, true) +
-         line("flux inwards", "W/m2", [](const ProbeRow& row) { return row.flux_w_m2; }, false);
+         line(
+             "temperature", "K", [](const ProbeRow& row) { return row.temperature_k; }, false) +
+         line(
+             "sun", "W/m2", [](const ProbeRow& row) { return row.sun_w_m2; }, true) +
+         line(
+             "flux inwards", "W/m2", [](const ProbeRow& row) { return row.flux_w_m2; }, false);
 }
 
 /// Cells of a band's table: name, radiance and share of each term, then sum and pixel.
@@ -87,7 +90,8 @@ std::string surface_sentence(const Explanation& found) {
 std::string air_sentence(const Explanation& found, const ExplainedBand& band) {
   if (!found.surface) return fmt::format("Apparent temperature {:.3f} K.", band.apparent_k);
   return fmt::format(
-      "Apparent temperature {:.3f} K, emissivity {:.4f}, air lets {:.4f} through (sunlight {:.4f}).",
+      "Apparent temperature {:.3f} K, emissivity {:.4f}, air lets {:.4f} through (sunlight "
+      "{:.4f}).",
       band.apparent_k, band.terms.emissivity_frac, band.terms.air_frac, band.terms.air_sun_frac);
 }
 

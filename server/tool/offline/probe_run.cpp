@@ -108,7 +108,7 @@ void ProbeRun::plan(const ProbeFinder& finder) {
 }
 
 void ProbeRun::read(const renderer::FrameView& view, const OfflineShot& shot,
-                   const renderer::SurfaceForcing& forcing, ProbeRow& row) {
+                    const renderer::SurfaceForcing& forcing, ProbeRow& row) {
   const std::size_t px = std::size_t{shot.window_px.y_px} * view.width_px + shot.window_px.x_px;
   if (points_[row.point].kind != ProbePoint::Kind::pixel) {
     // The camera looks along the normal, so that the depth is the distance of the camera. A mesh

@@ -290,6 +290,129 @@ TEST(AirModel, agrees_with_lowtran_along_paths_and_towards_the_sky) {
   EXPECT_LT(radiance.max, 0.08);
 }
 
+/// A path through air in bands of any shape, as LOWTRAN7 rev 4.2 has it (20 cm-1, 300 K): heights
+/// and range in m; a range of 0 stands for the way to space, with the elevation in deg in place of
+/// the target's height. The radiance in W m-2 sr-1 is that of level paths, whose air has one
+/// temperature.
+struct BandPath {
+  AirClimate climate;
+  double visibility_km;
+  double sensor_m;
+  double target_m;
+  double range_m;
+  std::array<double, 5> tau;
+  std::array<double, 5> radiance;
+};
+constexpr BandPath kBandPaths[] = {
+    {AirClimate::subarctic_summer,
+     5,
+     68,
+     68,
+     8786,
+     {0.1165, 0.1167, 0.1423, 0.1395, 0.1621},
+     {0.6734, 0.3006, 38.26, 0.000292, 31.68}},
+    {AirClimate::subarctic_winter,
+     23,
+     2992,
+     12.194,
+     0,
+     {0.3501, 0.4318, 0.6819, 0.7716, 0.7273},
+     {}},
+    {AirClimate::midlatitude_winter, 5, 0, 43.431, 0, {0.3249, 0.403, 0.5884, 0.5338, 0.6332}, {}},
+    {AirClimate::midlatitude_winter,
+     23,
+     738,
+     3.254,
+     0,
+     {0.0694, 0.0609, 0.2402, 0.2179, 0.2726},
+     {}},
+    {AirClimate::tropical, 10, 2146, 0, 7605, {0.19, 0.1703, 0.133, 0.2504, 0.1535}, {}},
+    {AirClimate::tropical,
+     50,
+     11957,
+     11957,
+     3407,
+     {0.7281, 0.932, 0.9716, 0.987, 0.9794},
+     {0.008078, 0.001064, 0.3082, 1.136e-08, 0.2027}},
+    {AirClimate::midlatitude_summer,
+     23,
+     0,
+     0,
+     38299,
+     {0.0139, 0.0024, 0.0005, 0.0414, 0.0005},
+     {1, 0.4449, 50.49, 0.0005508, 42.73}},
+    {AirClimate::us_standard,
+     23,
+     2993,
+     2993,
+     208,
+     {0.755, 0.9379, 0.9628, 0.9463, 0.9758},
+     {0.08542, 0.01016, 1.139, 4.658e-06, 0.6535}},
+    {AirClimate::midlatitude_summer, 23, 0, 206, 5249, {0.2501, 0.2439, 0.2253, 0.3325, 0.258}, {}},
+    {AirClimate::midlatitude_summer, 50, 0, 45.13, 0, {0.3109, 0.3431, 0.4263, 0.4675, 0.4748}, {}},
+    {AirClimate::midlatitude_winter, 23, 0, 275, 412, {0.6596, 0.8474, 0.9067, 0.8666, 0.9346}, {}},
+    {AirClimate::subarctic_summer, 5, 0, 2515, 4562, {0.3295, 0.3957, 0.4898, 0.4221, 0.5375}, {}},
+    {AirClimate::midlatitude_summer, 10, 0, 48.863, 0, {0.3009, 0.3362, 0.4178, 0.438, 0.4639}, {}},
+    {AirClimate::us_standard,
+     50,
+     1883,
+     1883,
+     1117,
+     {0.6072, 0.7861, 0.8678, 0.817, 0.9055},
+     {0.1908, 0.04738, 4.732, 2.815e-05, 2.931}},
+};
+std::vector<Band> any_bands() {
+  return {{3.7, 4.8, {}},
+          {4.5, 4.8, {}},
+          {7.5, 13.5, {}},
+          {2.0, 2.5, {}},
+          {7.5, 14.0, {{7.5, 0.0}, {8.5, 1.0}, {12.0, 1.0}, {14.0, 0.0}}}};
+}
+
+TEST(AirModel, bands_of_any_shape_agree_with_lowtran) {
+  const std::vector<Band> bands = any_bands();
+  for (std::size_t b = 0; b < bands.size(); ++b) {
+    const auto air = BandAir::build(bands[b]);
+    ASSERT_TRUE(air) << air.error().text;
+    Tally tau;
+    Tally radiance;
+    for (const BandPath& row : kBandPaths) {
+      const AirColumn column = column_of(row.climate, row.visibility_km);
+      const AirPath path = row.range_m == 0.0
+                               ? AirPath::to_space(column, row.sensor_m, row.target_m * kDegree)
+                               : AirPath::between(column, row.sensor_m, row.target_m, row.range_m);
+      tau.add(air->transmittance(path, AirSource::black_300k) - row.tau[b]);
+      if (row.radiance[b] <= 0.0) continue;
+      radiance.add(air->path_radiance_w_m2_sr(path) / row.radiance[b] - 1.0);
+    }
+    EXPECT_LT(tau.rms(), 0.006) << b;
+    EXPECT_LT(tau.max, 0.02) << b;
+    EXPECT_LT(radiance.rms(), 0.05) << b;
+  }
+}
+
+TEST(AirModel, a_band_made_of_pieces_is_that_with_terms_of_its_own) {
+  // A hair wider, the band is made of pieces of the spectrum.
+  for (const char* name : kBands) {
+    const BandAir own = air_of(name);
+    Band wider = flat_band(name);
+    wider.hi_um += 1e-6;
+    const BandAir pieces = *BandAir::build(wider);
+    EXPECT_NEAR(pieces.sun_outside_w_m2() / own.sun_outside_w_m2(), 1.0, 2e-3) << name;
+    Tally tau;
+    for (const LowtranPath& row : kSights) {
+      const AirColumn column = column_of(row.climate, row.visibility_km);
+      const AirPath path = AirPath::between(column, row.sensor_m, row.target_m, row.range_m);
+      for (const AirSource source :
+           {AirSource::black_300k, AirSource::black_800k, AirSource::sun_lowtran}) {
+        tau.add(pieces.transmittance(path, source) - own.transmittance(path, source));
+      }
+    }
+    EXPECT_LT(tau.rms(), 0.005) << name;
+    EXPECT_LT(tau.max, 0.02) << name;
+  }
+}
+
 TEST(AirModel, agrees_with_lowtran_on_the_sun_at_the_ground) {
   for (const LowtranSun& row : kSuns) {
     const AirColumn column = column_of(row.climate, row.visibility_km);

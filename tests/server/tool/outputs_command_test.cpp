@@ -76,6 +76,7 @@ const std::vector<OutputCase>& output_cases() {
     add({"weather", "no.csv"}, {"--json", "--plot"});
     add({"materials"}, {"--json", "--plot"});
     add({"probe", "box", "--at", "0,0,0", "--time-s", "0"}, {"--out", "--plot"});
+    add({"explain", "box", "--time-s", "0", "--px", "0,0"}, {"--json", "--html"});
     add({"campaign", "no.toml", "--out", "GOOD"}, {"--json"}, {"--out"});
     add({"scene", "check", "box"}, {"--json"});
     add({"scene", "preview", "box", "--out", "GOOD"}, {"--out"});

@@ -23,8 +23,8 @@ INSTANTIATE_TEST_SUITE_P(Commands, CliHelp,
                                          "demo", "engage", "view", "compare", "inspect", "evaluate",
                                          "generate", "log", "make-log", "bench", "latency",
                                          "trigger", "trace", "solve", "fit", "fms-sim", "man",
-                                         "export", "weather", "materials", "probe", "campaign",
-                                         "scene", "doctor"));
+                                         "export", "weather", "materials", "probe", "explain",
+                                         "campaign", "scene", "doctor"));
 
 TEST(CliUsage, commands_of_emit_lab_are_those_of_emit) {
   const std::string folder = EMIT_TEST_BIN_DIR;

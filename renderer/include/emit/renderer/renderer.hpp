@@ -123,8 +123,8 @@ struct FrameStats {
   /// The frame may be coarser than asked (thermal.method = "cached"). The camera is where nobody
   /// planned it, or samples ran out before its view was fine enough: triangles may be wider than
   /// pixels and shadows coarser than thermal.tolerance_k. The flag is also set while some surfaces
-  /// have not taken in a change of the weather or of an entity's shade, and in a frame that
-  /// prepared the surface anew (rewarm_s).
+  /// have not taken in a change of the weather or of an entity's shade, while heat along surfaces
+  /// near edges is not settled to 0.05 K, and in a frame that prepared the surface anew (rewarm_s).
   bool coarse = false;
   /// Small targets without a window of their own, because a frame has no more windows or its draws
   /// fill their memory. They have one sample per pixel, so their energy is not kept.
