@@ -89,7 +89,7 @@ server/tool/fms_sim: server/axes server/motion server/net server/tool/support co
 server/tool/truth: server/tool/support renderer/physics renderer/reference renderer/scene
 server/tool/doctor: server/tool/command_line server/tool/support config/include renderer/include
 server/tool/nature: server/tool/command_line server/tool/support config/include renderer/physics renderer/scene
-server/tool/offline: server/tool/command_line server/tool/support server/tool/truth renderer/include renderer/physics renderer/reference renderer/scene
+server/tool/offline: server/tool/command_line server/tool/report server/tool/support server/tool/truth renderer/include renderer/physics renderer/reference renderer/scene
 server/tool/campaign: server/app server/client server/tool/command_line server/tool/offline server/tool/report server/tool/streams server/tool/support config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
 server/tool/scenes: server/tool/command_line server/tool/offline server/tool/support config/include renderer/image renderer/include renderer/physics renderer/reference renderer/scene renderer/scene/generate
 server/tool/commands: server/tool/doctor server/tool/scenes server/tool/nature server/tool/campaign server/tool/command_line server/tool/offline server/tool/engage server/tool/truth server/tool/support server/tool/streams server/tool/view server/tool/fms_sim server/gnss server/motion server/agents/render server/app server/client server/net server/rt config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene

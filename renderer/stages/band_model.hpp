@@ -45,7 +45,7 @@ class BandModel final : public BandLights {
     return tables_[first_emissivity_ + material * entries_.size() + band];
   }
 
-  /// What a pixel shows, as the radiance pass reads it.
+  /// Surface or sky of a pixel, as the radiance pass reads it.
   struct Seen {
     bool surface = false;  ///< false: sky, of which only the elevation counts
     float temperature_k = 0.0F;

@@ -16,8 +16,7 @@ namespace emit::server {
 class ConnectionAcceptor {
  public:
   /// Takes a connection of a peer. What it throws ends the connection alone.
-  using Take =
-      std::function<void(boost::asio::ip::tcp::socket socket, const SocketAddress& peer)>;
+  using Take = std::function<void(boost::asio::ip::tcp::socket socket, const SocketAddress& peer)>;
 
   ConnectionAcceptor(boost::asio::io_context& context, Take take)
       : acceptor_(context), retry_(context), take_(std::move(take)) {}

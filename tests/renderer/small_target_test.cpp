@@ -205,7 +205,7 @@ TEST(SmallTarget, ThoseWithoutAWindowAreCounted) {
   const Picture fewer = sky.show(plates);
   EXPECT_EQ(fewer.plain_targets, 0U);
   EXPECT_NEAR(sky.energy(plates), 32.0 * plates[20].energy(), 0.01 * 32.0 * plates[20].energy());
-  // What is not in the image needs no window.
+  // A target that is not in the image needs no window.
   for (std::size_t i = 32; i < plates.size(); ++i) {
     plates[i].on = true;
     plates[i].at_px.y = 3.0 * kHeight;

@@ -251,8 +251,8 @@ const KeyTable<Material>& material_keys() {
                                 EMIT_FIELD(emissivity_frac),
                                 "Total hemispherical emissivity in the long-wave infrared.")),
       band_emissivity_key<Material>(
-          "Emissivities by name of the band. A band that is not listed takes that of the listed "
-          "built-in band that it overlaps most, and `emissivity_frac` where it overlaps none."),
+          "Emissivities by name of the band. Other bands take that of the listed built-in band "
+          "that they overlap most, else `emissivity_frac`."),
       layers_key(),
       choice<Material>("roughness",
                        std::vector<std::pair<std::string, Roughness>>{

@@ -111,8 +111,10 @@ Result<Explanation> explain(const ExplainOptions& command, scene::ScenarioDesc s
   const double first_s = std::max(command.time_s - 3600.0 * command.hours,
                                   1e-9 * static_cast<double>(scenario.thermal.history_start_ns));
   if (!place || first_s >= command.time_s) return found;
-  constexpr double kStepS = 1800.0;
-  const auto steps = static_cast<int>(std::ceil((command.time_s - first_s) / kStepS));
+  constexpr double kStepS = 600.0;
+  constexpr double kMostSteps = 48.0;
+  const auto steps =
+      static_cast<int>(std::min(std::ceil((command.time_s - first_s) / kStepS), kMostSteps));
   std::vector<double> times_s;
   for (int i = 0; i <= steps; ++i) {
     times_s.push_back(std::lerp(first_s, command.time_s, double{1} * i / steps));
@@ -121,6 +123,14 @@ Result<Explanation> explain(const ExplainOptions& command, scene::ScenarioDesc s
                {finder->follow(*place, std::llround(1e9 * command.time_s), pixel.name)});
   if (auto done = run.run(*finder, command.gpu_index); !done) {
     return tl::unexpected(std::move(done.error()));
+  }
+  // The history is seen along the normal. Beside an edge the two pictures differ.
+  constexpr double kSameK = 0.5;
+  const double last_k = run.rows().back().temperature_k;
+  if (found.surface && !(std::abs(last_k - found.surface->temperature_k) <= kSameK)) {
+    warn(fmt::format(
+        "the pixel lies beside an edge: it shows {:.3f} K, its history ends at {:.3f} K",
+        found.surface->temperature_k, last_k));
   }
   found.history = std::move(run);
   return found;

@@ -54,7 +54,7 @@ std::string history_text(const ProbeRun& history) {
                        sparkline(values, from_zero ? 0.0 : low, high), low, high, unit);
   };
   const double hours = (history.times_s().back() - history.times_s().front()) / 3600.0;
-  return fmt::format("history of the surface, last {:g} h\n", hours) +
+  return fmt::format("history of the surface, last {:.3g} h\n", hours) +
          line(
              "temperature", "K", [](const ProbeRow& row) { return row.temperature_k; }, false) +
          line(
@@ -81,8 +81,8 @@ std::string surface_sentence(const Explanation& found) {
   const ExplainedSurface& s = *found.surface;
   return fmt::format(
       "It shows object '{}', material '{}', {:.2f} m away at ({:.3f}, {:.3f}, {:.3f}) m, normal "
-      "({:.3f}, {:.3f}, {:.3f}), {:.3f} K. The face sees {:.1f} % sky and {:.1f} % of the direct "
-      "sun.",
+      "({:.3f}, {:.3f}, {:.3f}), {:.3f} K. The face sees {:.1f} % sky and takes {:.1f} % of the "
+      "direct sun (visible share times cosine).",
       s.object, s.material, s.range_m, s.position_m.x, s.position_m.y, s.position_m.z, s.normal.x,
       s.normal.y, s.normal.z, s.temperature_k, 100.0 * s.sky_frac, 100.0 * s.sun_cosine);
 }
@@ -190,7 +190,8 @@ std::string explain_page(const Explanation& found) {
       "td, th { padding: 3px 18px 3px 0; text-align: right; }\n"
       "td:first-child, th:first-child { text-align: left; }\n"
       "th { border-bottom: 2px solid #999; }\n";
-  std::string body = "<p>" + html_escaped(surface_sentence(found)) + "</p>\n";
+  std::string body = "<h1>" + html_escaped(headline(found)) + "</h1>\n<p>" +
+                     html_escaped(surface_sentence(found)) + "</p>\n";
   for (const ExplainedBand& band : found.bands) {
     body += fmt::format(
         "<h2>{}</h2>\n<table>\n<tr><th>term</th><th>W m<sup>-2</sup> sr<sup>-1</sup></th>"

@@ -13,7 +13,7 @@
 #include "tool/offline/probe_run.hpp"
 #include "tool/support/json.hpp"
 
-/// What `emit explain` found about a pixel, as text, JSON and page.
+/// Findings of `emit explain` about a pixel, as text, JSON and page.
 namespace emit::tool {
 
 /// Radiance of a pixel in one band.

@@ -67,7 +67,10 @@ class Scale {
       low_ = kind_ == PlotScale::linear ? 0.0 : -1.0;
       high_ = 1.0;
     }
-    const double margin = std::max(0.04 * (high_ - low_), kind_ == PlotScale::linear ? 1e-9 : 0.05);
+    // Values that hardly differ get room, so that the labels of the axis differ too.
+    const double largest = std::max({std::abs(low_), std::abs(high_), 1e-8});
+    const double margin =
+        std::max(0.04 * (high_ - low_), kind_ == PlotScale::linear ? 1e-3 * largest : 0.05);
     low_ -= margin;
     high_ += margin;
   }

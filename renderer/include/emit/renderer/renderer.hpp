@@ -57,7 +57,7 @@ struct OutputOptions {
   /// Share of the pixel that small targets cover (scene::SensorDesc::small_target_px), 0..1. Where
   /// it is not 0 the other planes show the nearest of these targets.
   bool coverage = false;
-  /// What Renderer::radiance_terms() needs.
+  /// Planes that Renderer::radiance_terms() needs.
   bool terms = false;
   Ladder ladder = Ladder::none;
   std::uint32_t slots = 3;    ///< read-back slots, 2..16: frames in flight plus frames being sent
@@ -148,8 +148,8 @@ struct FrameView {
   std::span<const float> object_id;                      ///< empty unless asked for
   std::span<const float> sun_cosine;                     ///< empty unless asked for
   std::span<const float> sky_frac;                       ///< empty unless asked for
-  /// What arrives at the surface from everything but the sun, one plane per band; material; empty
-  /// unless OutputOptions::terms.
+  /// Radiance that arrives at the surface from everything but the sun, one plane per band, and the
+  /// material; empty unless OutputOptions::terms.
   std::vector<std::span<const float>> incoming_w_m2_sr;
   std::span<const float> material;
   std::span<const float> coverage_frac;  ///< empty unless asked for
@@ -169,8 +169,8 @@ struct SurfacePlace {
   glm::dvec3 normal{0.0, 0.0, 1.0};  ///< outward, unit length, world axes
 };
 
-/// Where the radiance of a pixel comes from, in one band. The radiances are W m-2 sr-1 at the
-/// aperture, behind the air, and add up to the pixel.
+/// Parts of a pixel's radiance in one band. They are W m-2 sr-1 at the aperture, behind the air,
+/// and add up to the pixel.
 struct RadianceTerms {
   double emission_w_m2_sr = 0.0;    ///< of the surface
   double sky_w_m2_sr = 0.0;         ///< reflected

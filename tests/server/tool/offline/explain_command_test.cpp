@@ -42,7 +42,8 @@ double number(const std::string& json, const std::string& key) {
 TEST(CliExplain, the_terms_add_up_to_the_pixel_through_air_of_every_kind) {
   const TemporaryFolder folder;
   const std::string terms =
-      "atmosphere.band=[{band=\"8-12\",terms=[[0.7,0.1],[0.3,2.0]],vertical_transmittance_frac=0.6},"
+      "atmosphere.band=[{band=\"8-12\",terms=[[0.7,0.1],[0.3,2.0]],vertical_transmittance_frac=0.6}"
+      ","
       "{band=\"3-5\",terms=[[1.0,0.3]],vertical_transmittance_frac=0.5}]";
   const std::vector<Arguments> airs{
       {},
@@ -94,12 +95,13 @@ TEST(CliExplain, the_pixel_is_that_of_the_picture_and_its_surface_has_a_history)
             frame->find("radiance")->pixels[px]);
   EXPECT_EQ(static_cast<float>(number(json, "temperature_k")),
             frame->find("temperature")->pixels[px]);
-  EXPECT_EQ(json_value(json, "object"), "block_on_road");
+  EXPECT_EQ(json_value(json, "object"), "\"block_on_road\"");
   // The scenario's history begins 3.5 hours before; the last entry is the pixel itself.
   const std::size_t last = json.rfind("\"sim_time_s\"");
   EXPECT_EQ(number(json.substr(last), "sim_time_s"), 12600.0);
   EXPECT_NEAR(number(json.substr(last), "temperature_k"), number(json, "temperature_k"), 0.3);
   EXPECT_EQ(number(json.substr(json.find("\"history\"")), "sim_time_s"), 0.0);
+  EXPECT_EQ(result.err.find("beside an edge"), std::string::npos) << result.err;
   EXPECT_NE(result.out.find("last 3.5 h"), std::string::npos) << result.out;
   const std::string page = read_text(folder.file("e.html"));
   EXPECT_NE(page.find("<svg"), std::string::npos);
@@ -108,8 +110,8 @@ TEST(CliExplain, the_pixel_is_that_of_the_picture_and_its_surface_has_a_history)
 
 TEST(CliExplain, the_sky_is_a_path_without_a_surface) {
   const TemporaryFolder folder;
-  const ProcessResult result = explain(
-      "160,2", {"--set", "sensor.look_at_m=[-0.7,0.2,20]", "--hours", "0", "--json", folder.file("e.json")});
+  const ProcessResult result = explain("160,2", {"--set", "sensor.look_at_m=[-0.7,0.2,20]",
+                                                 "--hours", "0", "--json", folder.file("e.json")});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const std::string json = read_text(folder.file("e.json"));
   EXPECT_NE(json.find("\"surface\": null"), std::string::npos) << json;
