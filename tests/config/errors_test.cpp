@@ -224,7 +224,7 @@ const std::vector<Case>& cases() {
       {"band_without_atmosphere",
        "[[band]]\nname = \"w\"\nlo_um = 1\nhi_um = 5\n[[channel]]\nname = \"c\"\nband = \"w\"\n",
        "s.toml:2:1: band 'w' has no atmosphere: add an [[atmosphere.band]] for it or set "
-       "atmosphere.enabled = false (the built-in air covers 2 to 14.29 um)"},
+       "atmosphere.enabled = false (the built-in air covers 2 to 14.2857 um)"},
       {"atmosphere_sum", "[[atmosphere.band]]\nband = \"3-5\"\nterms = [[0.5, 0.1], [0.4, 1]]\n",
        "s.toml:4:9: the amplitudes of 'terms' add up to 0.9, must be 1"},
       {"display", "[display]\nmin_k = 300\nmax_k = 290\n",

@@ -447,7 +447,7 @@ scene::AtmosphereDesc resolve_atmosphere(const Node& root, const scene::Scenario
       diagnostics.add(
           band_location(root, band.name, table),
           fmt::format("band '{}' has no atmosphere: add an [[atmosphere.band]] for it or "
-                      "set atmosphere.enabled = false (the built-in air covers {} to {:.2f} um)",
+                      "set atmosphere.enabled = false (the built-in air covers {} to {:.4f} um)",
                       band.name, physics::kAirShortestUm, physics::kAirLongestUm));
     }
   }

@@ -341,7 +341,7 @@ Result<BandAir> BandAir::build(const Band& band) {
   if (auto valid = validate(band); !valid) return tl::unexpected(std::move(valid.error()));
   if (!covers(band)) {
     return make_error(ErrorCode::invalid_argument,
-                      fmt::format("the built-in air covers {} to {:.2f} um, the band {} to {} um",
+                      fmt::format("the built-in air covers {} to {:.4f} um, the band {} to {} um",
                                   kAirShortestUm, kAirLongestUm, band.lo_um, band.hi_um));
   }
   BandAir out;

@@ -63,7 +63,14 @@ Result<void> explain_frame(const scene::ScenarioDesc& scenario, const ProbeFinde
     const glm::dvec3 boresight = shots[0].sensor_pose.world_from_body * glm::dvec3(1.0, 0.0, 0.0);
     surface.range_m = static_cast<double>(view.depth_m[i]) / glm::dot(ray, boresight);
     surface.position_m = shots[0].sensor_pose.position_world_m + surface.range_m * ray;
-    if (place) surface.normal = place->normal;
+    if (place) {
+      surface.normal = place->normal;
+    } else {
+      warn(
+          "a ray finds no surface in the pixel: its reflected sky is that of an upright face, and "
+          "it "
+          "has no history");
+    }
     surface.temperature_k = static_cast<double>(view.temperature_k[i]);
     surface.sky_frac = static_cast<double>(view.sky_frac[i]);
     surface.sun_cosine = static_cast<double>(view.sun_cosine[i]);
@@ -139,6 +146,9 @@ Result<Explanation> explain(const ExplainOptions& command, scene::ScenarioDesc s
 int run(const ExplainOptions& command) {
   const auto scenario = load_scenario_choice(command.input);
   if (!scenario) return fail_config(scenario.error());
+  if (const auto time_ns = sim_time_ns("--time-s", command.time_s); !time_ns) {
+    return fail_call(time_ns.error());
+  }
   const auto found = explain(command, *scenario);
   if (!found) return fail_call(found.error());
   fmt::print(text_stream(command.json), "{}", explain_text(*found));

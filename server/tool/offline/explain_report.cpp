@@ -5,9 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <functional>
 
+#include "tool/offline/time_list.hpp"
 #include "tool/report/html_page.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/svg_plot.hpp"
@@ -110,16 +110,6 @@ std::array<std::pair<std::string_view, double>, 5> named_terms(
            {"reflected neighbours", terms.neighbours_w_m2_sr},
            {"reflected sun", terms.sun_w_m2_sr},
            {"path", terms.path_w_m2_sr}}};
-}
-
-std::string utc_text(std::int64_t epoch_utc_ns, double time_s) {
-  const auto seconds = static_cast<std::time_t>(
-      std::floor(1e-9 * static_cast<double>(epoch_utc_ns) + std::round(time_s * 1e3) / 1e3));
-  std::tm parts{};
-  ::gmtime_r(&seconds, &parts);
-  std::array<char, 32> text{};
-  std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &parts);
-  return text.data();
 }
 
 std::string explain_text(const Explanation& found) {

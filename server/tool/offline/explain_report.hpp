@@ -54,7 +54,4 @@ struct Explanation {
 [[nodiscard]] Json explain_json(const Explanation& found);
 [[nodiscard]] std::string explain_page(const Explanation& found);
 
-/// Date and time of a simulation time, ISO 8601.
-[[nodiscard]] std::string utc_text(std::int64_t epoch_utc_ns, double time_s);
-
 }  // namespace emit::tool

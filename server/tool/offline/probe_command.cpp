@@ -12,9 +12,9 @@
 #include <utility>
 
 #include "tool/command_line/common_options.hpp"
-#include "tool/offline/explain_report.hpp"
 #include "tool/offline/probe_points.hpp"
 #include "tool/offline/probe_run.hpp"
+#include "tool/offline/time_list.hpp"
 #include "tool/offline/time_options.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/replacing_file.hpp"

@@ -7,6 +7,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <ctime>
 #include <optional>
 #include <utility>
 
@@ -146,6 +147,16 @@ Result<std::vector<double>> parse_times(std::string_view text, const ClockOfDay&
     return refused(text, fmt::format("more than {} instants", kMaxTimes));
   }
   return times_s;
+}
+
+std::string utc_text(std::int64_t epoch_utc_ns, double time_s) {
+  const auto seconds = static_cast<std::time_t>(
+      std::floor(1e-9 * static_cast<double>(epoch_utc_ns) + std::round(time_s * 1e3) / 1e3));
+  std::tm parts{};
+  ::gmtime_r(&seconds, &parts);
+  std::array<char, 32> text{};
+  std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &parts);
+  return text.data();
 }
 
 }  // namespace emit::tool

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstdint>
+#include <string>
 #include <string_view>
 #include <vector>
 
 #include "emit/physics/error.hpp"
 
-/// Lists of instants on the command line: `--times 06:00..20:00/10min`.
+/// Instants on the command line, `--times 06:00..20:00/10min`, and in what commands write.
 namespace emit::tool {
 
 /// Clock by which a list names times of the day.
@@ -25,5 +26,8 @@ inline constexpr std::size_t kMaxTimes = 100'000;
 /// quoting the entry.
 [[nodiscard]] physics::Result<std::vector<double>> parse_times(std::string_view text,
                                                                const ClockOfDay& clock);
+
+/// Returns date and time of a simulation time, ISO 8601. `epoch_utc_ns` is the UTC of time 0.
+[[nodiscard]] std::string utc_text(std::int64_t epoch_utc_ns, double time_s);
 
 }  // namespace emit::tool

@@ -128,5 +128,14 @@ TEST(CliExplain, a_pixel_outside_the_image_is_refused) {
   EXPECT_NE(result.err.find("319,255"), std::string::npos) << result.err;
 }
 
+TEST(CliExplain, a_time_out_of_range_is_refused) {
+  for (const char* time_s : {"nan", "1e30"}) {
+    const ProcessResult result =
+        run_emit({"explain", "box", "--time-s", time_s, "--px", "0,0", "--hours", "0"});
+    EXPECT_EQ(result.exit_code, 2) << time_s;
+    EXPECT_NE(result.err.find("--time-s"), std::string::npos) << result.err;
+  }
+}
+
 }  // namespace
 }  // namespace emit::test
