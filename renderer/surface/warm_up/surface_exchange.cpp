@@ -41,6 +41,14 @@ enum class Pass : std::uint8_t {
   settle,   ///< carries all samples until the radiation of every window has settled
 };
 
+/// Time of a pass over the record as a share of one that settles, about: a window is carried once,
+/// or some ten times.
+constexpr double share_of_settling(Pass pass) noexcept {
+  return pass == Pass::settle ? 1.0 : pass == Pass::bounce ? 0.2 : 0.1;
+}
+/// Share of the time of a window after which all its samples have been carried once.
+constexpr double kCarriedFrac = 0.2;
+
 /// Range of intervals of the record.
 struct Window {
   std::size_t first = 0;
@@ -189,8 +197,8 @@ class Sweeper {
  private:
   /// Puts what is known of the radiation in a window into rows, as a guess.
   void load(const Window& window);
-  /// Iterates a window.
-  void settle(const Window& window);
+  /// Iterates a window. `report` receives the share that is done. Returns false when it stopped.
+  [[nodiscard]] bool settle(const Window& window, const SurfaceProgress& report);
   /// Keeps the rows and the states at the end of a window.
   void store(const Window& window);
   /// Makes the interiors of this pass those that the next one takes.
@@ -315,9 +323,11 @@ bool Sweeper::sweep(Pass pass, const SurfaceProgress& report) {
   std::ranges::fill(shift_w_m2_, 0.0F);
   for (Window window; window.first < intervals_; window.first += window.count) {
     window.count = std::min(kWindow, intervals_ - window.first);
-    if (report && !report(static_cast<double>(window.first) / static_cast<double>(intervals_))) {
-      return false;
-    }
+    const SurfaceProgress within = [&](double frac) {
+      const double done = static_cast<double>(window.first) + frac * static_cast<double>(window.count);
+      return !report || report(done / static_cast<double>(intervals_));
+    };
+    if (!within(0.0)) return false;
     load(window);
     seen_.begin(sent_, window.count);
     faces_.resize(entities_ * (window.count + 1));
@@ -326,7 +336,7 @@ bool Sweeper::sweep(Pass pass, const SurfaceProgress& report) {
     std::ranges::fill(needed_, std::uint8_t{0});
     carry_groups(window, [&](std::uint32_t s) { return pass != Pass::courses || takes_course(s); });
     march(window);
-    if (pass == Pass::settle) settle(window);
+    if (pass == Pass::settle && !settle(window, within)) return false;
     store(window);
   }
   take_courses();
@@ -348,25 +358,33 @@ void Sweeper::load(const Window& window) {
   });
 }
 
-void Sweeper::settle(const Window& window) {
+bool Sweeper::settle(const Window& window, const SurfaceProgress& report) {
+  double most_w_m2 = 0.0;
+  double done_frac = 0.0;
   for (std::uint32_t i = 0; i < kMostIterations; ++i) {
     const double faces_w_m2 = measure_faces(window);
     const double seen_w_m2 = seen_.look(sent_);
     const double left_w_m2 = std::max(faces_w_m2, seen_w_m2);
     if (!(left_w_m2 > kExchangeResidual_w_m2)) {
       // The radiation has settled with the heat along the surface that was known: find it anew.
-      if (std::ranges::find(needed_, std::uint8_t{1}) == needed_.end()) return;
+      if (std::ranges::find(needed_, std::uint8_t{1}) == needed_.end()) return true;
       march(window);
       continue;
     }
     if (i + 1 == kMostIterations) {
       model_.exchange_left_w_m2 = std::max(model_.exchange_left_w_m2, left_w_m2);
-      return;
+      return true;
     }
+    // The residual falls by about the same factor in each iteration.
+    most_w_m2 = std::max(most_w_m2, left_w_m2);
+    done_frac = std::max(done_frac, std::log(most_w_m2 / left_w_m2) /
+                                        std::log(most_w_m2 / (0.5 * kExchangeResidual_w_m2)));
+    if (!report(kCarriedFrac + (1.0 - kCarriedFrac) * done_frac)) return false;
     seen_.take(i >= kPlainIterations);
     const bool faces_changed = faces_w_m2 > kRenewFrac * kExchangeResidual_w_m2;
     carry_groups(window, [&](std::uint32_t s) { return changed(s, window, faces_changed); });
   }
+  return true;
 }
 
 void Sweeper::store(const Window& window) {
@@ -786,12 +804,15 @@ bool exchange(const SurfaceInputs& inputs, const ExchangeOptions& options,
   Sweeper sweeper(inputs, options, std::move(histories), model);
   std::vector<Pass> passes{Pass::settle};
   if (sweeper.takes_courses()) passes = {Pass::bounce, Pass::courses, Pass::settle};
-  for (std::size_t i = 0; i < passes.size(); ++i) {
+  double whole = 0.0;
+  for (const Pass pass : passes) whole += share_of_settling(pass);
+  double before = 0.0;
+  for (const Pass pass : passes) {
     const auto within = [&](double frac) {
-      return !report ||
-             report((static_cast<double>(i) + frac) / static_cast<double>(passes.size()));
+      return !report || report((before + frac * share_of_settling(pass)) / whole);
     };
-    if (!sweeper.sweep(passes[i], within)) return false;
+    if (!sweeper.sweep(pass, within)) return false;
+    before += share_of_settling(pass);
   }
   return !report || report(1.0);
 }
