@@ -53,7 +53,6 @@ enum Offset : std::size_t {
   kQualityRungAt = 224,
   kEncodingAt = 225,
   kOutputStepsAt = 226,
-  kReservedAt = 227,
   kAppliedShiftXAt = 228,
   kPreviousJitterAt = 232,
   kSlotBeginAt = 240,
@@ -177,7 +176,6 @@ void encode(const FrameHeader& header, std::span<std::byte, kFrameHeaderBytes> o
   wire::put(to, kQualityRungAt, header.quality_rung);
   wire::put(to, kEncodingAt, static_cast<std::uint8_t>(header.encoding));
   wire::put(to, kOutputStepsAt, header.output_steps);
-  wire::put(to, kReservedAt, std::uint8_t{0});
   wire::put(to, kAppliedShiftXAt, header.applied_shift_x_px);
   wire::put(to, kPreviousJitterAt, header.previous_jitter_ns);
   wire::put(to, kSlotBeginAt, header.slot_begin_ns);
@@ -220,7 +218,8 @@ HeaderFault parse_frame_header(std::span<const std::byte> bytes, FrameHeader& he
   const auto quantity = wire::get<std::uint8_t>(bytes, kQuantityAt);
   if (quantity != static_cast<std::uint8_t>(PixelQuantity::radiance_w_m2_sr) &&
       quantity != static_cast<std::uint8_t>(PixelQuantity::temperature_k) &&
-      quantity != static_cast<std::uint8_t>(PixelQuantity::drive)) {
+      quantity != static_cast<std::uint8_t>(PixelQuantity::drive) &&
+      quantity != static_cast<std::uint8_t>(PixelQuantity::counts)) {
     return HeaderFault::quantity;
   }
   const auto encoding = wire::get<std::uint8_t>(bytes, kEncodingAt);
@@ -281,7 +280,7 @@ HeaderFault parse_frame_header(std::span<const std::byte> bytes, FrameHeader& he
   header.shift_y_px = wire::get<float>(bytes, kShiftYAt);
   header.pointing_error_px = wire::get<float>(bytes, kPointingErrorAt);
   header.display_ns = wire::get<std::int64_t>(bytes, kDisplayAt);
-  header.output_steps = wire::get<std::uint8_t>(bytes, kOutputStepsAt);
+  header.output_steps = wire::get<std::uint16_t>(bytes, kOutputStepsAt);
   header.applied_shift_x_px = wire::get<float>(bytes, kAppliedShiftXAt);
   header.applied_shift_y_px = wire::get<float>(bytes, kAppliedShiftYAt);
   header.fov_h_rad = wire::get<float>(bytes, kFovAt);

@@ -17,6 +17,14 @@ std::string_view to_string(scene::ChannelKind kind) noexcept {
   return kind == scene::ChannelKind::projector ? "projector" : "injection";
 }
 
+protocol::PixelQuantity quantity_of(const Channel& channel) noexcept {
+  using protocol::PixelQuantity;
+  if ((channel.output_steps & protocol::kOutputCounted) != 0) return PixelQuantity::counts;
+  constexpr std::uint16_t kCommands = protocol::kOutputCorrected | protocol::kOutputDriven;
+  return (channel.output_steps & kCommands) != 0 ? PixelQuantity::drive
+                                                 : PixelQuantity::radiance_w_m2_sr;
+}
+
 namespace {
 
 /// Takes the memory of an image whose pixels are not used where they lie in the source's memory.
@@ -37,10 +45,10 @@ double focal_px_of(const std::optional<scene::ScenarioDesc>& scenario, const Cam
 
 /// Makes the output of an image, where it has one, and its size.
 physics::Result<void> make_output(Picture& picture, const protocol::ImageSize& image,
-                                  double focal_px) {
+                                  double focal_px, const std::optional<physics::Band>& band) {
   picture.size = {picture.window_px.width_px, picture.window_px.height_px};
   if (picture.output == scene::ChannelOutput{}) return {};
-  auto chain = OutputChain::make(picture.output, {image, picture.window_px, focal_px});
+  auto chain = OutputChain::make(picture.output, {image, picture.window_px, focal_px, band});
   if (!chain) return tl::unexpected(std::move(chain.error()));
   picture.chain = std::move(*chain);
   picture.size = picture.chain->frame();
@@ -150,7 +158,9 @@ physics::Result<ChannelTable> make_channels(const std::optional<scene::ScenarioD
       Picture& picture = table.pictures[channel.picture];
       if (picture.pixels() == 0) {
         const double focal_px = focal_px_of(scenario, table.cameras[picture.camera]);
-        if (auto made = make_output(picture, {source.width_px, source.height_px}, focal_px);
+        std::optional<physics::Band> band;
+        if (scenario) band = scene::spectral_band(scenario->bands[picture.plane]);
+        if (auto made = make_output(picture, {source.width_px, source.height_px}, focal_px, band);
             !made) {
           return tl::unexpected(
               std::move(made.error())
@@ -161,7 +171,7 @@ physics::Result<ChannelTable> make_channels(const std::optional<scene::ScenarioD
       channel.width_px = picture.size.width_px;
       channel.height_px = picture.size.height_px;
       channel.source_px = picture.chain ? picture.chain->source_px() : picture.window_px;
-      channel.output_steps = picture.chain ? picture.chain->steps() : std::uint8_t{0};
+      channel.output_steps = picture.chain ? picture.chain->steps() : std::uint16_t{0};
     }
     return std::move(table);
   };
@@ -255,7 +265,8 @@ TakenPicture take_picture(Picture& picture, const renderer::FrameView& view,
   const std::span<const float> plane = view.radiance_w_m2_sr[picture.plane];
   if (picture.chain) {
     std::vector<float>& made = picture.copies[slot];
-    const std::uint32_t clamped_px = picture.chain->apply(plane, shift_px, made);
+    const std::uint32_t clamped_px =
+        picture.chain->apply(plane, {shift_px, view.frame_number}, made);
     return {made, clamped_px};
   }
   const scene::PixelRect& window = picture.window_px;

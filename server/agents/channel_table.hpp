@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "agents/messages.hpp"
+#include "emit/protocol/frame_header.hpp"
 #include "emit/protocol/output_geometry.hpp"
 #include "emit/scene/scene_desc.hpp"
 #include "output/output_chain.hpp"
@@ -25,9 +26,9 @@ struct Channel {
   std::vector<scene::ResponseSample> response;  ///< response of the band; empty: a rectangle
   std::uint32_t width_px = 0;                   ///< width of its frames
   std::uint32_t height_px = 0;
-  scene::PixelRect window_px;     ///< part of the sensor's image that its frames show
-  scene::PixelRect source_px;     ///< part that they are made of: the window and what is around it
-  std::uint8_t output_steps = 0;  ///< protocol::OutputSteps
+  scene::PixelRect window_px;      ///< part of the sensor's image that its frames show
+  scene::PixelRect source_px;      ///< part that they are made of: the window and what is around it
+  std::uint16_t output_steps = 0;  ///< protocol::OutputSteps
   std::uint32_t sensor_width_px = 0;
   std::uint32_t sensor_height_px = 0;
   std::uint32_t every_nth = 1;  ///< shows frames 1, 1 + n, 1 + 2 n, ... of every run
@@ -68,6 +69,9 @@ struct ChannelTable {
 };
 
 [[nodiscard]] std::string_view to_string(scene::ChannelKind kind) noexcept;
+
+/// Returns what the pixels of a channel's frames are. RT-safe.
+[[nodiscard]] protocol::PixelQuantity quantity_of(const Channel& channel) noexcept;
 
 /// Returns the cameras of a scenario's channels, in the order of their first channels. Without
 /// channels it is one.

@@ -124,7 +124,8 @@ Result<std::vector<fs::path>> buffer_files(const fs::path& gltf) {
 
 /// Returns the paths of the files that the output of a channel names.
 std::vector<fs::path*> files_of(scene::ChannelOutput& output) {
-  std::vector<fs::path*> out{&output.distortion_file, &output.nuc_file, &output.drive_table_file};
+  std::vector<fs::path*> out{&output.distortion_file, &output.nuc_file, &output.drive_table_file,
+                             &output.optics.spot_file};
   std::erase_if(out, [](const fs::path* file) { return file->empty(); });
   return out;
 }

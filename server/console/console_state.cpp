@@ -19,7 +19,7 @@ namespace {
 using Out = std::back_insert_iterator<std::string>;
 
 bool has_radiance(const Channel& channel) noexcept {
-  return (channel.output_steps & (protocol::kOutputCorrected | protocol::kOutputDriven)) == 0;
+  return quantity_of(channel) == protocol::PixelQuantity::radiance_w_m2_sr;
 }
 
 physics::Band band_of(const Channel& channel) {

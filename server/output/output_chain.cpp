@@ -2,6 +2,7 @@
 #include "output/output_chain.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -21,16 +22,24 @@ namespace {
 /// turned by 90 degrees reads as many neighbours of a row in memory.
 constexpr std::uint32_t kRowsAtOnce = 16;
 
-std::uint8_t steps_of(const scene::ChannelOutput& settings) noexcept {
+/// Returns whether a detector changes radiance before its converter.
+bool detects(const scene::ChannelDetector& detector) noexcept {
+  return std::ranges::any_of(
+      std::array{detector.netd_k, detector.row_noise_k, detector.column_noise_k,
+                 detector.gain_spread_frac, detector.offset_spread_k, detector.bad_px_frac},
+      [](double setting) { return setting > 0.0; });
+}
+
+std::uint16_t steps_of(const scene::ChannelOutput& settings) noexcept {
   using protocol::OutputSteps;
   using scene::PictureMirror;
   const auto if_so = [](bool so, OutputSteps step) {
-    return so ? static_cast<std::uint8_t>(step) : std::uint8_t{0};
+    return so ? static_cast<std::uint16_t>(step) : std::uint16_t{0};
   };
   const PictureMirror mirror = settings.mirror;
   const bool both = mirror == PictureMirror::both;
   const bool distorted = !settings.distortion_file.empty() || settings.has_polynomial();
-  return static_cast<std::uint8_t>(
+  return static_cast<std::uint16_t>(
       if_so(both || mirror == PictureMirror::horizontal, protocol::kOutputMirroredHorizontally) |
       if_so(both || mirror == PictureMirror::vertical, protocol::kOutputMirroredVertically) |
       if_so(settings.rotate_deg % 180 == 90, protocol::kOutputRotated90) |
@@ -38,7 +47,10 @@ std::uint8_t steps_of(const scene::ChannelOutput& settings) noexcept {
       if_so(distorted, protocol::kOutputDistorted) |
       if_so(settings.apply_shift, protocol::kOutputShifted) |
       if_so(!settings.nuc_file.empty(), protocol::kOutputCorrected) |
-      if_so(!settings.drive_table_file.empty(), protocol::kOutputDriven));
+      if_so(!settings.drive_table_file.empty(), protocol::kOutputDriven) |
+      if_so(settings.optics != scene::ChannelOptics{}, protocol::kOutputBlurred) |
+      if_so(detects(settings.detector), protocol::kOutputDetected) |
+      if_so(settings.detector.counts_per_w_m2_sr > 0.0, protocol::kOutputCounted));
 }
 
 /// Returns a window with a margin on all sides, as far as the image has it.
@@ -67,6 +79,25 @@ Result<PositionMap::Source> positions_of(const scene::ChannelOutput& settings,
   }
   return PositionMap::brown(picture, focal_px, settings.distortion_radial,
                             settings.distortion_tangential);
+}
+
+/// Returns the share of the irradiance on the axis that each pixel of a frame gets: the fourth
+/// power of the cosine of its angle. The distortion plays no part.
+std::vector<float> vignetting_of(std::uint16_t steps, const ImageSize& frame,
+                                 const OutputChain::Origin& origin) {
+  const ImageSize window{origin.window_px.width_px, origin.window_px.height_px};
+  std::vector<float> out;
+  out.reserve(std::size_t{frame.width_px} * frame.height_px);
+  for (std::uint32_t row = 0; row < frame.height_px; ++row) {
+    for (std::uint32_t column = 0; column < frame.width_px; ++column) {
+      const ImagePoint at = protocol::window_point(steps, window, {column + 0.5, row + 0.5});
+      const double x = origin.window_px.x_px + at.x_px - 0.5 * origin.image.width_px;
+      const double y = origin.window_px.y_px + at.y_px - 0.5 * origin.image.height_px;
+      const double cos2 = 1.0 / (1.0 + (x * x + y * y) / (origin.focal_px * origin.focal_px));
+      out.push_back(static_cast<float>(cos2 * cos2));
+    }
+  }
+  return out;
 }
 
 }  // namespace
@@ -105,6 +136,22 @@ Result<OutputChain> OutputChain::make(const scene::ChannelOutput& settings, cons
     out.turn_first_ = index_of(0, 0);
     out.turn_right_ = index_of(1, 0) - out.turn_first_;
     out.turn_down_ = index_of(0, 1) - out.turn_first_;
+  }
+  if (settings.optics.spot != scene::SpotKind::none) {
+    auto spot = make_spot(settings.optics);
+    if (!spot) return tl::unexpected(std::move(spot.error()).with_context("optics.spot_file"));
+    out.spot_.emplace(*spot, out.source_px_, origin.image);
+  }
+  if (settings.optics.vignetting) {
+    if (!(origin.focal_px > 0.0)) {
+      return make_error(ErrorCode::config, "vignetting needs the sensor's field of view");
+    }
+    out.vignetting_frac_ = vignetting_of(out.steps_, out.frame_, origin);
+  }
+  if ((out.steps_ & (protocol::kOutputDetected | protocol::kOutputCounted)) != 0) {
+    auto detector = Detector::make(settings.detector, origin.band, out.frame_);
+    if (!detector) return tl::unexpected(std::move(detector.error()));
+    out.detector_ = std::move(*detector);
   }
   if (!settings.nuc_file.empty()) {
     auto gain = PixelGain::read(settings.nuc_file, out.frame_);
@@ -145,11 +192,14 @@ void OutputChain::turn_rows(std::span<const float> image, std::uint32_t first, s
   }
 }
 
-std::uint32_t OutputChain::apply(std::span<const float> image, const glm::vec2& shift_px,
-                                 std::span<float> out) const noexcept {
+std::uint32_t OutputChain::apply(std::span<const float> image, const Moment& moment,
+                                 std::span<float> out) noexcept {
   const std::size_t width = frame_.width_px;
   EMIT_DCHECK_OP(out.size(), ==, width * frame_.height_px);
-  const glm::vec2 moved_px = (steps_ & protocol::kOutputShifted) != 0 ? shift_px : glm::vec2(0.0F);
+  const glm::vec2 moved_px =
+      (steps_ & protocol::kOutputShifted) != 0 ? moment.shift_px : glm::vec2(0.0F);
+  if (spot_) image = spot_->apply(image);
+  if (detector_) detector_->begin_frame(moment.frame_number);
   std::uint32_t clamped = 0;
   for (std::uint32_t first = 0; first < frame_.height_px; first += kRowsAtOnce) {
     const std::uint32_t end = std::min(first + kRowsAtOnce, frame_.height_px);
@@ -157,6 +207,11 @@ std::uint32_t OutputChain::apply(std::span<const float> image, const glm::vec2& 
     for (std::uint32_t row = first; row < end; ++row) {
       const std::span<float> line = out.subspan(row * width, width);
       if (map_) map_->sample_line(image, moved_px, row, line);
+      if (!vignetting_frac_.empty()) {
+        const float* const share_frac = vignetting_frac_.data() + row * width;
+        for (std::size_t i = 0; i < width; ++i) line[i] *= share_frac[i];
+      }
+      if (detector_) clamped += detector_->apply_line(row, line);
       if (gain_) gain_->apply_line(row, line);
       if (table_) clamped += table_->apply(line);
     }

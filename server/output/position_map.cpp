@@ -84,7 +84,7 @@ PositionMap::Source PositionMap::brown(const ImageSize& picture, double focal_px
   return out;
 }
 
-PositionMap::PositionMap(const Source& source, std::uint8_t output_steps, const ImageSize& window,
+PositionMap::PositionMap(const Source& source, std::uint16_t output_steps, const ImageSize& window,
                          const ImagePoint& window_at, const SampledPart& part,
                          float outside_w_m2_sr)
     : frame_(source.frame), part_(part), outside_w_m2_sr_(outside_w_m2_sr) {

@@ -51,7 +51,7 @@ class PositionMap {
 
   /// Makes a map. `output_steps` says how the picture was mirrored and rotated, `window` is the
   /// size before that, and `window_at` its top left corner in the sampled part, px.
-  PositionMap(const Source& source, std::uint8_t output_steps, const protocol::ImageSize& window,
+  PositionMap(const Source& source, std::uint16_t output_steps, const protocol::ImageSize& window,
               const protocol::ImagePoint& window_at, const SampledPart& part,
               float outside_w_m2_sr);
 

@@ -195,6 +195,28 @@ const std::vector<Case>& cases() {
       {"shift_of_an_injected_image",
        "[[channel]]\nname = \"a\"\nband = \"3-5\"\napply_shift = true\n",
        "s.toml:5:15: 'apply_shift' needs kind = \"projector\": an injected image has no shift"},
+      {"optics_of_a_projector",
+       "[[channel]]\nname = \"a\"\nband = \"3-5\"\nkind = \"projector\"\n[channel.optics]\n"
+       "vignetting = true\n",
+       "s.toml:6:1: 'optics' needs kind = \"injection\": the seeker before a projector has its "
+       "own"},
+      {"spot_without_a_size",
+       "[[channel]]\nname = \"a\"\nband = \"3-5\"\n[channel.optics]\nspot = \"airy\"\n",
+       "s.toml:6:8: spot = \"airy\" needs 'airy_px'"},
+      {"size_of_another_spot",
+       "[[channel]]\nname = \"a\"\nband = \"3-5\"\n[channel.optics]\nspot = \"airy\"\n"
+       "airy_px = 1\nsigma_px = 1\n",
+       "s.toml:8:12: 'sigma_px' needs spot = \"gaussian\""},
+      {"counts_and_drive",
+       "[[channel]]\nname = \"a\"\nband = \"3-5\"\nnuc_file = \"n.exr\"\n[channel.detector]\n"
+       "counts_per_w_m2_sr = 1\n",
+       "s.toml:5:12: use only one of 'nuc_file' and 'detector.counts_per_w_m2_sr'"},
+      {"bits_without_counts",
+       "[[channel]]\nname = \"a\"\nband = \"3-5\"\n[channel.detector]\ncounts_bits = 12\n",
+       "s.toml:6:15: 'counts_bits' needs 'counts_per_w_m2_sr'"},
+      {"photons_without_noise",
+       "[[channel]]\nname = \"a\"\nband = \"3-5\"\n[channel.detector]\nphoton_frac = 0.5\n",
+       "s.toml:6:15: 'photon_frac' needs 'netd_k'"},
       {"outside_of_nothing", "[[channel]]\nname = \"a\"\nband = \"3-5\"\noutside_w_m2_sr = 2.0\n",
        "s.toml:5:19: 'outside_w_m2_sr' has no effect without a distortion or 'apply_shift'"},
       {"channel_twice",
@@ -377,6 +399,13 @@ TEST_F(ConfigTest, a_missing_file_of_an_output_is_reported_where_it_is_named) {
   EXPECT_EQ(scenario_error(channel), "(loaded)");
   options_.require_scene_files = true;
   EXPECT_EQ(scenario_error(channel), "s.toml:5:20: 'drive_table_file': none.csv: no such file");
+}
+
+TEST_F(ConfigTest, a_missing_spot_is_reported_where_it_is_named) {
+  options_.require_scene_files = true;
+  EXPECT_EQ(scenario_error("[[channel]]\nname = \"a\"\nband = \"8-12\"\n[channel.optics]\n"
+                           "spot = \"file\"\nspot_file = \"none.exr\"\n"),
+            "s.toml:7:13: 'spot_file': none.exr: no such file");
 }
 
 TEST_F(ConfigTest, a_fault_in_a_library_names_the_library) {

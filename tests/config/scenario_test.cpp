@@ -116,6 +116,27 @@ name = "barrel"
 band = "det"
 distortion_radial = [0.125, -0.25, 0.5]
 distortion_tangential = [0.0625, -0.03125]
+[[channel]]
+name = "seen"
+band = "det"
+[channel.optics]
+spot = "airy"
+airy_px = 1.25
+obscuration_frac = 0.375
+vignetting = true
+[channel.detector]
+reference_k = 310.0
+netd_k = 0.0625
+photon_frac = 0.5
+row_noise_k = 0.03125
+column_noise_k = 0.015625
+gain_spread_frac = 0.25
+offset_spread_k = 0.75
+bad_px_frac = 0.125
+seed = 77
+counts_per_w_m2_sr = 512.0
+counts_offset = 64.0
+counts_bits = 12
 
 [[object]]
 name = "ground"
@@ -249,7 +270,7 @@ TEST_F(ConfigTest, every_scenario_key_reaches_its_field) {
   EXPECT_EQ(s.bands[0].response.size(), 3U);
   EXPECT_EQ(s.bands[1].name, "7.7-9.3");
   EXPECT_EQ(s.bands[1].lo_um, 7.7);
-  ASSERT_EQ(s.channels.size(), 4U);
+  ASSERT_EQ(s.channels.size(), 5U);
   EXPECT_EQ(s.channels[0].kind, scene::ChannelKind::projector);
   EXPECT_EQ(s.channels[0].band, "det");
   EXPECT_TRUE(s.channels[0].window_px.empty());
@@ -271,6 +292,23 @@ TEST_F(ConfigTest, every_scenario_key_reaches_its_field) {
   EXPECT_EQ(output.drive_table_file, folder_ / "drive.csv");
   EXPECT_EQ(s.channels[3].output.distortion_radial, (std::array{0.125, -0.25, 0.5}));
   EXPECT_EQ(s.channels[3].output.distortion_tangential, (std::array{0.0625, -0.03125}));
+  const scene::ChannelOutput& seen = s.channels[4].output;
+  EXPECT_EQ(seen.optics, (scene::ChannelOptics{.spot = scene::SpotKind::airy,
+                                               .airy_px = 1.25,
+                                               .obscuration_frac = 0.375,
+                                               .vignetting = true}));
+  EXPECT_EQ(seen.detector, (scene::ChannelDetector{.reference_k = 310.0,
+                                                   .netd_k = 0.0625,
+                                                   .photon_frac = 0.5,
+                                                   .row_noise_k = 0.03125,
+                                                   .column_noise_k = 0.015625,
+                                                   .gain_spread_frac = 0.25,
+                                                   .offset_spread_k = 0.75,
+                                                   .bad_px_frac = 0.125,
+                                                   .seed = 77,
+                                                   .counts_per_w_m2_sr = 512.0,
+                                                   .counts_offset = 64.0,
+                                                   .counts_bits = 12}));
   ASSERT_EQ(s.objects.size(), 3U);
   EXPECT_EQ(s.objects[0].gltf, folder_ / "ground.glb");
   EXPECT_EQ(s.objects[0].material, "concrete");

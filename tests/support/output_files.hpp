@@ -29,10 +29,10 @@ inline std::vector<float> image_of(const protocol::ImageSize& size, const ValueA
 }
 
 /// Returns the frame that a chain makes of an image.
-inline std::vector<float> made(const server::OutputChain& chain, const std::vector<float>& image,
+inline std::vector<float> made(server::OutputChain& chain, const std::vector<float>& image,
                                const glm::vec2& shift_px = glm::vec2(0.0F)) {
   std::vector<float> out(std::size_t{chain.frame().width_px} * chain.frame().height_px, -1.0F);
-  static_cast<void>(chain.apply(image, shift_px, out));
+  static_cast<void>(chain.apply(image, {shift_px, 0}, out));
   return out;
 }
 

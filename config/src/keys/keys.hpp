@@ -100,6 +100,8 @@ struct DaemonHead {
 [[nodiscard]] const KeyTable<SensorDraft>& sensor_keys();
 [[nodiscard]] const KeyTable<BandDraft>& band_keys();
 [[nodiscard]] const KeyTable<scene::ChannelDesc>& channel_keys();
+[[nodiscard]] const KeyTable<scene::ChannelOptics>& optics_keys();
+[[nodiscard]] const KeyTable<scene::ChannelDetector>& detector_keys();
 [[nodiscard]] const KeyTable<ObjectDraft>& object_keys();
 [[nodiscard]] const KeyTable<scene::ContactDesc>& contact_keys();
 [[nodiscard]] const KeyTable<InstanceDraft>& instance_keys();

@@ -119,6 +119,33 @@ void add_output_keys(KeyTable<ChannelDesc>& keys) {
       "of radiance."));
 }
 
+/// Adds the tables of the optics and the detector.
+void add_detector_keys(KeyTable<ChannelDesc>& keys) {
+  keys.push_back(custom<ChannelDesc>(
+      {"optics", "table", "", "", "Optics that an injected image lacks (`[channel.optics]`).",
+       false},
+      [](ChannelDesc& out, const Node& node, Diagnostics& diagnostics) {
+        if (expect_table(node, "optics", diagnostics)) {
+          read_table(node, optics_keys(), out.output.optics, diagnostics);
+        }
+      },
+      [](const ChannelDesc& in) -> std::optional<std::string> {
+        if (in.output.optics == scene::ChannelOptics{}) return std::nullopt;
+        return inline_table(in.output.optics, optics_keys());
+      }));
+  keys.push_back(custom<ChannelDesc>(
+      {"detector", "table", "", "", "Detector that reads the image (`[channel.detector]`).", false},
+      [](ChannelDesc& out, const Node& node, Diagnostics& diagnostics) {
+        if (expect_table(node, "detector", diagnostics)) {
+          read_table(node, detector_keys(), out.output.detector, diagnostics);
+        }
+      },
+      [](const ChannelDesc& in) -> std::optional<std::string> {
+        if (in.output.detector == scene::ChannelDetector{}) return std::nullopt;
+        return inline_table(in.output.detector, detector_keys());
+      }));
+}
+
 /// Adds the keys of a channel that does not look as the sensor does.
 void add_camera_keys(KeyTable<ChannelDesc>& keys) {
   keys.push_back(written_if<ChannelDesc>(
@@ -161,6 +188,81 @@ void add_camera_keys(KeyTable<ChannelDesc>& keys) {
 
 }  // namespace
 
+const KeyTable<scene::ChannelOptics>& optics_keys() {
+  using scene::ChannelOptics;
+  using scene::SpotKind;
+  static const KeyTable<ChannelOptics> keys = {
+      choice<ChannelOptics>(
+          "spot",
+          std::vector<std::pair<std::string, SpotKind>>{{"none", SpotKind::none},
+                                                        {"gaussian", SpotKind::gaussian},
+                                                        {"airy", SpotKind::airy},
+                                                        {"file", SpotKind::file}},
+          EMIT_FIELD(spot), "Spot that a point makes on the detector."),
+      written_if<ChannelOptics>(
+          [](const ChannelOptics& in) { return in.sigma_px != 0.0; },
+          number<ChannelOptics>("sigma_px", "px", between(0.1, 5.0), EMIT_FIELD(sigma_px),
+                                "gaussian: standard deviation of the spot.")),
+      written_if<ChannelOptics>(
+          [](const ChannelOptics& in) { return in.airy_px != 0.0; },
+          number<ChannelOptics>("airy_px", "px", between(0.1, 4.0), EMIT_FIELD(airy_px),
+                                "airy: wavelength times f-number over the pixel's pitch. The first "
+                                "dark ring has 1.22 times this radius.")),
+      written_if<ChannelOptics>(
+          [](const ChannelOptics& in) { return in.obscuration_frac != 0.0; },
+          number<ChannelOptics>("obscuration_frac", "", between(0.0, 0.9),
+                                EMIT_FIELD(obscuration_frac),
+                                "airy: diameter of the central obscuration over the aperture's.")),
+      path<ChannelOptics>("spot_file", EMIT_FIELD(spot_file),
+                          "file: EXR with the channel `spot`, an odd number of columns and rows. "
+                          "It is scaled to 1."),
+      written_if<ChannelOptics>(
+          [](const ChannelOptics& in) { return in.vignetting; },
+          boolean<ChannelOptics>("vignetting", EMIT_FIELD(vignetting),
+                                 "Irradiance falls with the fourth power of the cosine of the "
+                                 "angle to the axis.")),
+  };
+  return keys;
+}
+
+const KeyTable<scene::ChannelDetector>& detector_keys() {
+  using scene::ChannelDetector;
+  static const KeyTable<ChannelDetector> keys = {
+      number<ChannelDetector>("reference_k", "K", between(100.0, 3000.0), EMIT_FIELD(reference_k),
+                              "Temperature of the blackbody before which noise is stated."),
+      number<ChannelDetector>("netd_k", "K", between(0.0, 100.0), EMIT_FIELD(netd_k),
+                              "Temporal noise of each pixel: its standard deviation before the "
+                              "reference."),
+      number<ChannelDetector>("photon_frac", "", between(0.0, 1.0), EMIT_FIELD(photon_frac),
+                              "Share of that noise's variance that grows with radiance, as photon "
+                              "noise does."),
+      number<ChannelDetector>("row_noise_k", "K", between(0.0, 100.0), EMIT_FIELD(row_noise_k),
+                              "1/f noise in time that the pixels of a row share."),
+      number<ChannelDetector>("column_noise_k", "K", between(0.0, 100.0),
+                              EMIT_FIELD(column_noise_k),
+                              "1/f noise in time that the pixels of a column share."),
+      number<ChannelDetector>("gain_spread_frac", "", between(0.0, 0.3),
+                              EMIT_FIELD(gain_spread_frac),
+                              "Fixed pattern: standard deviation of the pixels' gains."),
+      number<ChannelDetector>("offset_spread_k", "K", between(0.0, 100.0),
+                              EMIT_FIELD(offset_spread_k),
+                              "Fixed pattern: standard deviation of the pixels' offsets."),
+      number<ChannelDetector>("bad_px_frac", "", between(0.0, 0.5), EMIT_FIELD(bad_px_frac),
+                              "Share of pixels that see nothing. Half of them are dead, half hot."),
+      integer<ChannelDetector>("seed", "", 0, std::numeric_limits<std::uint32_t>::max(),
+                               EMIT_FIELD(seed),
+                               "Of the fixed pattern and, with the number of the frame, of noise."),
+      number<ChannelDetector>("counts_per_w_m2_sr", "m2 sr W-1", between(0.0, 1e9),
+                              EMIT_FIELD(counts_per_w_m2_sr),
+                              "Above 0: frames hold whole counts in place of radiance."),
+      number<ChannelDetector>("counts_offset", "", between(0.0, 65535.0), EMIT_FIELD(counts_offset),
+                              "Counts of radiance 0."),
+      integer<ChannelDetector>("counts_bits", "", 8, 16, EMIT_FIELD(counts_bits),
+                               "Counts end at 2^bits - 1. Pixels beyond are counted and flagged."),
+  };
+  return keys;
+}
+
 const KeyTable<ChannelDesc>& channel_keys() {
   static const KeyTable<ChannelDesc> keys = [] {
     KeyTable<ChannelDesc> all = {
@@ -196,6 +298,7 @@ const KeyTable<ChannelDesc>& channel_keys() {
     };
     add_camera_keys(all);
     add_output_keys(all);
+    add_detector_keys(all);
     return all;
   }();
   return keys;

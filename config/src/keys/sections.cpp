@@ -36,6 +36,14 @@ const std::vector<SectionDoc>& scenario_sections() {
                   "both of kind injection.",
                   channel_keys(), scene::ChannelDesc{}),
       section_doc(
+          "channel.optics", false,
+          "Optics of an injection channel's seeker ([equations](../server/docs/optics.md)).",
+          optics_keys(), scene::ChannelOptics{}),
+      section_doc("channel.detector", false,
+                  "Detector of an injection channel's seeker. Noise depends on the frame's number "
+                  "alone, so that a replay has the same bits.",
+                  detector_keys(), scene::ChannelDetector{}),
+      section_doc(
           "band", true,
           "A spectral band beside the built-in ones. Each band in use costs one image per frame.",
           band_keys(), BandDraft{}),

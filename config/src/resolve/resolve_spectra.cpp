@@ -200,6 +200,62 @@ std::vector<ChannelDesc> resolve_channels(const Node& root,
 
 namespace {
 
+/// Reports settings of the optics and the detector that make no sense together.
+void check_optics(const Node& table, const ChannelDesc& channel, bool require_files,
+                  Diagnostics& diagnostics) {
+  const scene::ChannelOptics& optics = channel.output.optics;
+  const scene::ChannelDetector& detector = channel.output.detector;
+  using scene::SpotKind;
+  for (const char* section : {"optics", "detector"}) {
+    if (channel.kind != scene::ChannelKind::injection && table.has(section)) {
+      diagnostics.add(key_location(table, section),
+                      fmt::format("'{}' needs kind = \"injection\": the seeker before a projector "
+                                  "has its own",
+                                  section));
+    }
+  }
+  // Each shape needs its own numbers, and no others.
+  const Node empty{};
+  const Node& keys = table.has("optics") ? *table.find("optics") : empty;
+  const auto belongs = [&](const char* key, SpotKind kind, const char* shape, bool needed) {
+    if (keys.has(key) && optics.spot != kind) {
+      diagnostics.add(key_location(keys, key), fmt::format("'{}' needs spot = \"{}\"", key, shape));
+    }
+    if (needed && optics.spot == kind && !keys.has(key)) {
+      diagnostics.add(key_location(keys, "spot"),
+                      fmt::format("spot = \"{}\" needs '{}'", shape, key));
+    }
+  };
+  belongs("sigma_px", SpotKind::gaussian, "gaussian", true);
+  belongs("airy_px", SpotKind::airy, "airy", true);
+  belongs("obscuration_frac", SpotKind::airy, "airy", false);
+  belongs("spot_file", SpotKind::file, "file", true);
+  std::error_code code;
+  if (require_files && !optics.spot_file.empty() &&
+      !std::filesystem::is_regular_file(optics.spot_file, code)) {
+    diagnostics.add(key_location(keys, "spot_file"),
+                    fmt::format("'spot_file': {}: no such file", optics.spot_file.string()));
+  }
+  if (!table.has("detector")) return;
+  const Node& response = *table.find("detector");
+  const bool counts = detector.counts_per_w_m2_sr > 0.0;
+  for (const char* key : {"counts_offset", "counts_bits"}) {
+    if (!counts && response.has(key)) {
+      diagnostics.add(key_location(response, key),
+                      fmt::format("'{}' needs 'counts_per_w_m2_sr'", key));
+    }
+  }
+  for (const char* key : {"nuc_file", "drive_table_file"}) {
+    if (counts && table.has(key)) {
+      diagnostics.add(key_location(table, key),
+                      fmt::format("use only one of '{}' and 'detector.counts_per_w_m2_sr'", key));
+    }
+  }
+  if (response.has("photon_frac") && !(detector.netd_k > 0.0)) {
+    diagnostics.add(key_location(response, "photon_frac"), "'photon_frac' needs 'netd_k'");
+  }
+}
+
 /// Reports settings of an output that make no sense together, and files that do not exist.
 void check_output(const Node& table, const ChannelDesc& channel, bool require_files,
                   Diagnostics& diagnostics) {
@@ -219,6 +275,7 @@ void check_output(const Node& table, const ChannelDesc& channel, bool require_fi
     diagnostics.add(key_location(table, "outside_w_m2_sr"),
                     "'outside_w_m2_sr' has no effect without a distortion or 'apply_shift'");
   }
+  check_optics(table, channel, require_files, diagnostics);
   for (const auto& [key, file] : {std::pair{"distortion_file", &output.distortion_file},
                                   std::pair{"nuc_file", &output.nuc_file},
                                   std::pair{"drive_table_file", &output.drive_table_file}}) {

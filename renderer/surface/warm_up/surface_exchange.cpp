@@ -324,7 +324,8 @@ bool Sweeper::sweep(Pass pass, const SurfaceProgress& report) {
   for (Window window; window.first < intervals_; window.first += window.count) {
     window.count = std::min(kWindow, intervals_ - window.first);
     const SurfaceProgress within = [&](double frac) {
-      const double done = static_cast<double>(window.first) + frac * static_cast<double>(window.count);
+      const double done =
+          static_cast<double>(window.first) + frac * static_cast<double>(window.count);
       return !report || report(done / static_cast<double>(intervals_));
     };
     if (!within(0.0)) return false;

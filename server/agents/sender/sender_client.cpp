@@ -68,9 +68,7 @@ protocol::FrameHeader SenderClient::header_for(const Channel& channel,
     out.shift_x_px -= image.shift_px.x;
     out.shift_y_px -= image.shift_px.y;
   }
-  if ((channel.output_steps & (protocol::kOutputCorrected | protocol::kOutputDriven)) != 0) {
-    out.quantity = protocol::PixelQuantity::drive;
-  }
+  out.quantity = quantity_of(channel);
   if (const std::uint32_t clamped_px = image.clamped_px[channel.picture]; clamped_px > 0) {
     out.clamped_px += clamped_px;
     out.flags |= protocol::kFlagClamped;

@@ -82,6 +82,7 @@ class OutputBench {
   std::vector<std::vector<float>> images_;
   std::vector<float> out_;
   std::vector<Step> steps_;
+  std::uint64_t frame_number_ = 0;
   std::uint32_t sum_ = 0;  // of everything made, so that nothing is left out
 };
 
@@ -114,7 +115,8 @@ Result<void> OutputBench::write_files(scene::ChannelOutput& settings) const {
 Result<void> OutputBench::add(std::string name, const scene::ChannelOutput& settings) {
   auto chain = server::OutputChain::make(settings, {{command_.width_px, command_.height_px},
                                                     {0, 0, command_.width_px, command_.height_px},
-                                                    static_cast<double>(command_.width_px)});
+                                                    static_cast<double>(command_.width_px),
+                                                    physics::Band{8.0, 12.0, {}}});
   if (!chain) return tl::unexpected(std::move(chain.error()));
   steps_.push_back({std::move(name), std::move(*chain)});
   return {};
@@ -125,7 +127,7 @@ Result<void> OutputBench::make_steps() {
   if (auto written = write_files(files); !written) return written;
   steps_.push_back({"copy", std::nullopt});
   steps_.push_back({"checksum", std::nullopt});
-  std::vector<std::pair<std::string, scene::ChannelOutput>> wanted(8);
+  std::vector<std::pair<std::string, scene::ChannelOutput>> wanted(13);
   wanted[0].first = "mirror";
   wanted[0].second.mirror = scene::PictureMirror::horizontal;
   wanted[1].first = "rotate 90";
@@ -147,6 +149,26 @@ Result<void> OutputBench::make_steps() {
   wanted[7].second.mirror = scene::PictureMirror::horizontal;
   wanted[7].second.distortion_radial = wanted[3].second.distortion_radial;
   wanted[7].second.apply_shift = true;
+  wanted[8].first = "spot, Gaussian 0.7 px";
+  wanted[8].second.optics.spot = scene::SpotKind::gaussian;
+  wanted[8].second.optics.sigma_px = 0.7;
+  wanted[9].first = "spot, Airy 1 px";
+  wanted[9].second.optics.spot = scene::SpotKind::airy;
+  wanted[9].second.optics.airy_px = 1.0;
+  wanted[10].first = "noise";
+  wanted[10].second.detector.netd_k = 0.05;
+  wanted[11].first = "detector: noise, pattern, drift, bad pixels, counts";
+  wanted[11].second.detector = {.netd_k = 0.05,
+                                .photon_frac = 0.5,
+                                .row_noise_k = 0.01,
+                                .column_noise_k = 0.01,
+                                .gain_spread_frac = 0.01,
+                                .offset_spread_k = 0.1,
+                                .bad_px_frac = 1e-3,
+                                .counts_per_w_m2_sr = 200.0};
+  wanted[12].first = "Airy spot and detector";
+  wanted[12].second.optics = wanted[9].second.optics;
+  wanted[12].second.detector = wanted[11].second.detector;
   for (auto& [name, settings] : wanted) {
     if (auto added = add(std::move(name), settings); !added) return added;
   }
@@ -156,7 +178,7 @@ Result<void> OutputBench::make_steps() {
 void OutputBench::measure(Step& step, const std::vector<float>& image) {
   const double begun_ms = cpu_ms();
   if (step.chain) {
-    sum_ += step.chain->apply(image, {0.3125F, -0.6875F}, out_);
+    sum_ += step.chain->apply(image, {{0.3125F, -0.6875F}, ++frame_number_}, out_);
   } else if (step.name == "copy") {
     std::ranges::copy(image, out_.begin());
   } else {

@@ -65,11 +65,13 @@ physics::Result<void> save(const std::filesystem::path& directory,
   planes.applied_shift_y_px = frame.header.applied_shift_y_px;
   const bool temperature = frame.header.quantity == protocol::PixelQuantity::temperature_k;
   const bool drive = frame.header.quantity == protocol::PixelQuantity::drive;
+  const bool counts = frame.header.quantity == protocol::PixelQuantity::counts;
   (drive         ? planes.drive
+   : counts      ? planes.counts
    : temperature ? planes.temperature_k
                  : planes.radiance_w_m2_sr) = frame.pixels;
   // The band of a channel does not change: one table serves every frame.
-  if (!temperature && !drive && !apparent) {
+  if (!temperature && !drive && !counts && !apparent) {
     if (const auto band = channel.spectral_band()) apparent.emplace(*band);
   }
   std::vector<float> valid;
@@ -87,9 +89,7 @@ physics::Result<void> save(const std::filesystem::path& directory,
                      channel.band,
                      channel.band_lo_um,
                      channel.band_hi_um,
-                     drive         ? "drive"
-                     : temperature ? "K"
-                                   : "W m-2 sr-1",
+                     std::string(pixel_unit(frame.header.quantity)),
                      channel.response,
                      frame.header.fov_h_rad};
   return write_frame_files(directory, planes, style);

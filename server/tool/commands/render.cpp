@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "agents/channel_table.hpp"
 #include "emit/renderer/renderer.hpp"
 #include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
@@ -36,6 +37,7 @@ struct RenderOptions {
   std::optional<std::filesystem::path> json;
   std::vector<std::string> channels;  ///< empty: temperature, depth, object
   std::vector<std::string> bands;     ///< empty: the scenario's first
+  std::string output_of;              ///< [[channel]] whose frames are written; empty: the scene's
   std::string quality = "full";
   int gpu_index = -1;
 };
@@ -46,6 +48,8 @@ struct Plan {
   std::vector<std::size_t> bands;  ///< indices into the scenario's bands
   FrameFileNames exr_names;
   std::optional<FrameFileNames> png_names;
+  /// Channel whose frames are written in place of the scene's, the only one of its table.
+  std::optional<server::ChannelTable> output;
 };
 
 bool wants(const RenderOptions& command, const char* channel) {
@@ -72,7 +76,40 @@ Json plane_json(std::span<const float> plane) {
   return json;
 }
 
-/// Errors: invalid_argument (a time that is none, a band that the scenario does not have).
+/// Returns the channel that `emit render` shows as clients get it, alone in its table.
+/// Errors: invalid_argument (no channel has that name, or it has a camera of its own); those of
+/// server::make_channels().
+physics::Result<server::ChannelTable> output_channel(const std::string& name,
+                                                     const scene::ScenarioDesc& scenario) {
+  scene::ScenarioDesc alone = scenario;
+  std::erase_if(alone.channels, [&](const auto& channel) { return channel.name != name; });
+  const auto fail = [](std::string text) {
+    return physics::make_error(physics::ErrorCode::invalid_argument, std::move(text));
+  };
+  if (alone.channels.empty()) {
+    std::string known;
+    for (const scene::ChannelDesc& channel : scenario.channels) {
+      known += (known.empty() ? "" : ", ") + channel.name;
+    }
+    return fail(
+        fmt::format("--output-of: the scenario has no channel '{}' (it has: {})", name, known));
+  }
+  if (alone.channels.front().camera != scene::ChannelCamera{}) {
+    return fail(
+        fmt::format("--output-of: channel '{}' has a camera of its own, which only emitd "
+                    "places",
+                    name));
+  }
+  server::SourceInfo source;
+  source.width_px = scenario.sensor.width_px;
+  source.height_px = scenario.sensor.height_px;
+  source.planes = scenario.bands.size();
+  source.slots = 1;
+  return server::make_channels(alone, source);
+}
+
+/// Errors: invalid_argument (a time that is none, a band or a channel that the scenario does not
+/// have); those of output_channel().
 physics::Result<Plan> make_plan(const RenderOptions& command, const scene::ScenarioDesc& scenario) {
   auto resolved = resolve_times(command.times, scenario);
   if (!resolved) return tl::unexpected(std::move(resolved.error()));
@@ -84,10 +121,22 @@ physics::Result<Plan> make_plan(const RenderOptions& command, const scene::Scena
     if (!band) return tl::unexpected(band.error());
     if (std::ranges::find(bands, *band) == bands.end()) bands.push_back(*band);
   }
+  std::optional<server::ChannelTable> output;
+  if (!command.output_of.empty()) {
+    if (!command.bands.empty() || !command.channels.empty()) {
+      return physics::make_error(physics::ErrorCode::invalid_argument,
+                                 "--output-of takes neither --band nor --channel: the channel has "
+                                 "its band, and its frames have one quantity");
+    }
+    auto made = output_channel(command.output_of, scenario);
+    if (!made) return tl::unexpected(std::move(made.error()));
+    bands = {made->pictures.front().plane};
+    output = std::move(*made);
+  }
   const auto names = [&](const std::filesystem::path& pattern) {
     return FrameFileNames(pattern, times_s.size() > 1, bands.size() > 1);
   };
-  Plan plan{times_s, bands, names(command.out), std::nullopt};
+  Plan plan{times_s, bands, names(command.out), std::nullopt, std::move(output)};
   if (command.png) plan.png_names = names(*command.png);
   return plan;
 }
@@ -143,7 +192,7 @@ renderer::OutputOptions output_options(const RenderOptions& command) {
 /// One run: it renders the plan and writes files, lines and JSON.
 class Rendering {
  public:
-  Rendering(const RenderOptions& command, const scene::ScenarioDesc& scenario, const Plan& plan)
+  Rendering(const RenderOptions& command, const scene::ScenarioDesc& scenario, Plan& plan)
       : command_(command), scenario_(scenario), plan_(plan), apparent_(scenario.bands.size()) {}
   /// Errors: those of the renderer; io.
   [[nodiscard]] physics::Result<void> run();
@@ -157,17 +206,20 @@ class Rendering {
   [[nodiscard]] Json run_json() const;
   [[nodiscard]] Json frame_json(double time_s, std::size_t band,
                                 const renderer::FrameView& view) const;
+  /// Puts the frame of the plan's channel in place of the scene's. Returns what it holds.
+  [[nodiscard]] Json show_output(const renderer::FrameView& view, FramePlanes& planes);
   [[nodiscard]] physics::Result<void> write_pictures(double time_s, std::size_t band,
                                                      FramePlanes& planes);
   [[nodiscard]] physics::Result<void> write_json_file() const;
 
   const RenderOptions& command_;
   const scene::ScenarioDesc& scenario_;
-  const Plan& plan_;
+  Plan& plan_;
   std::vector<std::optional<ApparentTemperature>> apparent_;  ///< of the bands that were shown
   std::unique_ptr<OfflineFrames> frames_;
   std::optional<Film> film_;
   std::vector<Json> json_frames_;
+  Json json_output_;  ///< of the latest frame of the plan's channel
 };
 
 /// Writes the PNG and the picture of the film.
@@ -190,6 +242,37 @@ physics::Result<void> Rendering::write_pictures(double time_s, std::size_t band,
   return write_frame_png(film_->next_picture(), planes, style);
 }
 
+Json Rendering::show_output(const renderer::FrameView& view, FramePlanes& planes) {
+  server::Picture& picture = plan_.output->pictures.front();
+  const server::Channel& channel = plan_.output->channels.front();
+  const server::TakenPicture taken = server::take_picture(picture, view, 0, glm::vec2(0.0F));
+  const protocol::PixelQuantity quantity = server::quantity_of(channel);
+  planes.width_px = channel.width_px;
+  planes.height_px = channel.height_px;
+  planes.radiance_w_m2_sr = {};
+  planes.temperature_k = {};
+  planes.depth_m = {};
+  planes.object_id = {};
+  planes.coverage_frac = {};
+  (quantity == protocol::PixelQuantity::counts  ? planes.counts
+   : quantity == protocol::PixelQuantity::drive ? planes.drive
+                                                : planes.radiance_w_m2_sr) = taken.pixels;
+  planes.metadata.units = pixel_unit(quantity);
+  planes.output_steps = channel.output_steps;
+  if ((channel.output_steps & protocol::kOutputMoved) == 0) planes.window_px = picture.window_px;
+  planes.sensor_width_px = view.width_px;
+  planes.sensor_height_px = view.height_px;
+  if (taken.clamped_px > 0) {
+    warn(fmt::format("{} pixels of channel '{}' lie outside the range of its output",
+                     taken.clamped_px, channel.name));
+  }
+  Json json = plane_json(taken.pixels);
+  json.set("channel", channel.name).set("unit", planes.metadata.units);
+  json.set("width", channel.width_px).set("height", channel.height_px);
+  json.set("clamped_px", taken.clamped_px);
+  return json;
+}
+
 physics::Result<void> Rendering::write_files(double time_s, std::size_t band,
                                              const renderer::FrameView& view) {
   const scene::SpectralBand& shown = scenario_.bands[band];
@@ -205,6 +288,7 @@ physics::Result<void> Rendering::write_files(double time_s, std::size_t band,
       view.sim_time_ns, view.frame_number, view.sensor_pose, shown.name,
       shown.lo_um,      shown.hi_um,       "W m-2 sr-1",     scene::spectral_band(shown).response,
       view.fov_h_rad};
+  if (plan_.output) json_output_ = show_output(view, planes);
   if (auto done = write_pictures(time_s, band, planes); !done) return done;
   if (!wants(command_, "temperature")) planes.temperature_k = {};
   return write_frame_exr(plan_.exr_names.file(time_s, shown.name), planes);
@@ -301,6 +385,7 @@ physics::Result<void> Rendering::render(double time_s) {
     Json json = frame_json(time_s, band, view);
     const std::string& name = scenario_.bands[band].name;
     json.set("file", plan_.exr_names.file(time_s, name).string());
+    if (plan_.output) json.set("output", std::move(json_output_));
     json_frames_.push_back(std::move(json));
   }
   print_warnings(view);
@@ -334,8 +419,12 @@ int run(const RenderOptions& command) {
   if (command.quality == "preview") set_preview(input.set);
   const auto scenario = load_scenario_choice(input);
   if (!scenario) return fail_config(scenario.error());
-  const auto plan = make_plan(command, *scenario);
-  if (!plan) return fail(kExitUsage, plan.error().text);
+  auto plan = make_plan(command, *scenario);
+  if (!plan) {
+    return plan.error().code == physics::ErrorCode::invalid_argument
+               ? fail(kExitUsage, plan.error().text)
+               : fail_config(plan.error());
+  }
   if (auto writable = check_outputs(*plan, *scenario); !writable) return fail(writable.error());
   if (command.quality == "preview") fmt::print(text_stream(command.json), kPreviewText);
   if (auto done = Rendering(command, *scenario, *plan).run(); !done) return fail(done.error());
@@ -371,6 +460,10 @@ void add_options(CommandLine& line, RenderOptions& options) {
   line.option("--band", options.bands,
               "Band of the radiance channel; repeatable: a file for each; default: the first")
       .repeatable()
+      .type_name("NAME");
+  line.option("--output-of", options.output_of,
+              "[[channel]] of the scenario: files hold its frames as a client gets them, with "
+              "window, optics, detector and every other step of its output")
       .type_name("NAME");
   line.option("--quality", options.quality,
               "preview renders an own scene in seconds. It sets keys of [thermal] to low cost and "

@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <array>
+#include <string>
 
 #include "emit/protocol/record/frame_log.hpp"
 #include "emit/v1/control.pb.h"
 #include "emit/v1/frame.pb.h"
+#include "tool/support/frame_files.hpp"
 
 namespace emit::tool {
 namespace {
@@ -81,7 +83,7 @@ Result<void> FrameRecorder::write(protocol::LogWriter& log, const client::Receiv
   fill_channel(channel_, *message.mutable_channel());
   message.set_width_px(header.width_px);
   message.set_height_px(header.height_px);
-  message.set_unit(header.quantity == protocol::PixelQuantity::temperature_k ? "K" : "W m-2 sr-1");
+  message.set_unit(std::string(pixel_unit(header.quantity)));
   protocol::set_pixels(message, frame.pixels, encoder_);
   std::array<std::byte, protocol::kFrameHeaderBytes> bytes{};
   protocol::FrameHeader raw = header;

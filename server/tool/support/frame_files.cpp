@@ -30,7 +30,20 @@ std::string conversion_text(const physics::Band& band, bool response_known) {
   return limits + (response_known ? ", a rectangle" : ", response not known: a rectangle assumed");
 }
 
-std::string output_text(std::uint8_t output_steps) {
+std::string_view pixel_unit(protocol::PixelQuantity quantity) noexcept {
+  switch (quantity) {
+    case protocol::PixelQuantity::temperature_k:
+      return "K";
+    case protocol::PixelQuantity::drive:
+      return "drive";
+    case protocol::PixelQuantity::counts:
+      return "counts";
+    default:
+      return "W m-2 sr-1";
+  }
+}
+
+std::string output_text(std::uint16_t output_steps) {
   using namespace protocol;
   std::string out;
   const auto add = [&](bool so, const std::string& text) {
@@ -45,6 +58,9 @@ std::string output_text(std::uint8_t output_steps) {
   add((output_steps & kOutputShifted) != 0, "shift");
   add((output_steps & kOutputCorrected) != 0, "non-uniformity");
   add((output_steps & kOutputDriven) != 0, "drive table");
+  add((output_steps & kOutputBlurred) != 0, "optics");
+  add((output_steps & kOutputDetected) != 0, "detector");
+  add((output_steps & kOutputCounted) != 0, "counts");
   return out;
 }
 
@@ -57,6 +73,7 @@ physics::Result<void> write_frame_exr(const std::filesystem::path& file, const F
   };
   add(image::kRadianceChannel, frame.radiance_w_m2_sr);
   add(image::kDriveChannel, frame.drive);
+  add(image::kCountsChannel, frame.counts);
   add(image::kTemperatureChannel, frame.temperature_k);
   add(image::kDepthChannel, frame.depth_m);
   add(image::kObjectChannel, frame.object_id);
@@ -114,6 +131,7 @@ PngValues ranged_values(std::span<const float> values, const std::string& unit) 
 
 physics::Result<PngValues> png_values(const FramePlanes& frame, const PngStyle& style) {
   if (!frame.drive.empty()) return ranged_values(frame.drive, "");
+  if (!frame.counts.empty()) return ranged_values(frame.counts, "");
   PngValues out;
   out.unit = "K";
   out.min_value = style.min_k;

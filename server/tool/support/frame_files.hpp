@@ -14,6 +14,7 @@
 #include "emit/image/temperature_table.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/physics/planck.hpp"
+#include "emit/protocol/frame_header.hpp"
 #include "emit/scene/scene_desc.hpp"
 
 namespace emit::tool {
@@ -32,7 +33,8 @@ struct FramePlanes {
   std::uint32_t height_px = 0;
   std::span<const float> radiance_w_m2_sr;
   std::span<const float> temperature_k;
-  std::span<const float> drive;  ///< command of a projector's emitters, in place of radiance
+  std::span<const float> drive;   ///< command of a projector's emitters, in place of radiance
+  std::span<const float> counts;  ///< what a detector's converter reads, in place of radiance
   std::span<const float> depth_m;
   std::span<const float> object_id;
   std::span<const float> coverage_frac;
@@ -49,14 +51,17 @@ struct FramePlanes {
   std::uint32_t sensor_width_px = 0;
   std::uint32_t sensor_height_px = 0;
   // Steps that the pixels went through after the window (protocol::OutputSteps), and their shift.
-  std::uint8_t output_steps = 0;
+  std::uint16_t output_steps = 0;
   float applied_shift_x_px = 0.0F;
   float applied_shift_y_px = 0.0F;
 };
 
+/// Returns the unit of a quantity as files and people write it: "W m-2 sr-1", "K", "drive" or
+/// "counts".
+[[nodiscard]] std::string_view pixel_unit(protocol::PixelQuantity quantity) noexcept;
 /// Returns what protocol::OutputSteps say, for people: "mirror horizontal, rotate 90, shift". The
 /// text is empty where nothing was done.
-[[nodiscard]] std::string output_text(std::uint8_t output_steps);
+[[nodiscard]] std::string output_text(std::uint16_t output_steps);
 
 /// Quantity that the colours of a picture stand for.
 enum class PngQuantity : unsigned char {

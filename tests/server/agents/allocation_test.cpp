@@ -43,6 +43,16 @@ TEST(SteadyState, NoAgentOnTheFramePathAllocates) {
   output.nuc_file = files.exr("nuc.exr", {30, 40},
                               {{"gain", [](double, double) { return 1.0; }},
                                {"offset", [](double, double) { return 0.5; }}});
+  output.optics = {.spot = scene::SpotKind::airy, .airy_px = 0.5, .vignetting = true};
+  output.detector = {.netd_k = 0.1,
+                     .photon_frac = 0.5,
+                     .row_noise_k = 0.1,
+                     .column_noise_k = 0.1,
+                     .gain_spread_frac = 0.01,
+                     .bad_px_frac = 0.01};
+  scenario.sensor.fov_h_rad = 0.2;
+  scenario.sensor.width_px = 64;
+  scenario.sensor.height_px = 48;
   output.drive_table_file = files.text("drive.csv", "radiance_w_m2_sr,drive\n0,0\n50,1000\n");
   config::SourceConfig source;
   source.canned_width_px = 64;

@@ -187,6 +187,72 @@ TEST(DaemonOutput, AProjectorsFrameIsTheTransformedFrameOfTheOtherChannel) {
       << folder.read("stderr");
 }
 
+/// Counts of a seeker's channel against the radiance of the same frame: a wide spot and noise leave
+/// the mean of an even part, and the spread is that of the noise.
+TEST(DaemonOutput, ASeekersCountsAreTheRadianceWithOpticsAndNoise) {
+  const OutputFiles files;
+  const test::ScratchFolder& folder = files.folder();
+  folder.write("world.toml", std::string(kWorld) +
+                                 "[[channel]]\nname = \"seen\"\nband = \"8-12\"\n"
+                                 "[channel.optics]\nspot = \"gaussian\"\nsigma_px = 1.0\n"
+                                 "[channel.detector]\nnetd_k = 0.5\ncounts_per_w_m2_sr = 100\n"
+                                 "counts_offset = 1000\n");
+  DaemonProcess daemon(
+      folder,
+      {"--config", folder.write("emitd.toml", "scenario = \"world.toml\"\n" +
+                                                  canned_config(64, 48, "mode = \"host-step\""))});
+  ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
+  const std::string tcp = "tcp://" + daemon.control();
+  OutputStream truth = OutputStream::open(tcp, "truth");
+  OutputStream seen = OutputStream::open(tcp, "seen");
+  auto host = client::HostClient::connect("udp://" + daemon.host_udp());
+  ASSERT_TRUE(host.has_value());
+  std::vector<float> first;
+  for (std::uint64_t k = 1; k <= 3; ++k) {
+    ASSERT_NO_FATAL_FAILURE(send_pose(**host, k));
+    ASSERT_NO_FATAL_FAILURE(truth.take());
+    ASSERT_NO_FATAL_FAILURE(seen.take());
+    EXPECT_EQ(seen.header.quantity, protocol::PixelQuantity::counts);
+    EXPECT_EQ(seen.channel.output_steps, seen.header.output_steps);
+    EXPECT_EQ(seen.header.width_px, kWidthPx) << "pixels stay where they are";
+    // The convolution and the counts by their definition; what is left is noise.
+    double sum = 0.0;
+    double squares = 0.0;
+    int count = 0;
+    for (std::uint32_t y = 8; y < kHeightPx - 8; ++y) {
+      for (std::uint32_t x = 8; x < kWidthPx - 8; ++x) {
+        double blurred = 0.0;
+        double weights = 0.0;
+        for (int v = -5; v <= 5; ++v) {
+          for (int u = -5; u <= 5; ++u) {
+            const auto share = [](int at) {
+              return 0.5 * (std::erf((at + 0.5) / std::numbers::sqrt2) -
+                            std::erf((at - 0.5) / std::numbers::sqrt2));
+            };
+            const auto row = static_cast<std::size_t>(static_cast<int>(y) + v);
+            const auto column = static_cast<std::size_t>(static_cast<int>(x) + u);
+            blurred +=
+                share(u) * share(v) * static_cast<double>(truth.pixels[row * kWidthPx + column]);
+            weights += share(u) * share(v);
+          }
+        }
+        const float counts = seen.pixels[y * kWidthPx + x];
+        ASSERT_EQ(counts, std::floor(counts));
+        const double off = static_cast<double>(counts) - 1000.0 - 100.0 * blurred / weights;
+        sum += off;
+        squares += off * off;
+        ++count;
+      }
+    }
+    // dL/dT of 8 to 12 um at 300 K is 0.645 W m-2 sr-1 K-1; rounding adds 1/12 to the variance.
+    const double expected = 0.5 * 64.5;
+    EXPECT_NEAR(sum / count, 0.0, 4.0 * expected / std::sqrt(count));
+    EXPECT_NEAR(std::sqrt(squares / count), expected, 0.08 * expected);
+    if (k == 1) first = seen.pixels;
+  }
+  EXPECT_NE(seen.pixels, first);
+}
+
 TEST(DaemonOutput, AShiftWithoutAMotionSimulatorIsRefusedAtStart) {
   const OutputFiles files;
   const test::ScratchFolder& folder = files.folder();

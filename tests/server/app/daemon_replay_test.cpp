@@ -281,6 +281,10 @@ TEST(DaemonReplayOfCameras, EveryImageHasTheSameBits) {
   for (const char* name : {"seeker", "wide", "side"}) {
     scenario.channels.push_back({name, scene::ChannelKind::injection, "8-12"});
   }
+  // The seeker's noise has the same bits again too.
+  scenario.channels[0].output.optics = {.spot = scene::SpotKind::gaussian, .sigma_px = 0.8};
+  scenario.channels[0].output.detector = {
+      .netd_k = 0.1, .row_noise_k = 0.05, .gain_spread_frac = 0.01, .counts_per_w_m2_sr = 100.0};
   scenario.channels[1].camera.fov_h_rad = 0.4;
   scenario.channels[1].every_nth = 3;
   scenario.channels[2].camera.offset_body_m = {0.0, 5.0, 0.0};
@@ -321,6 +325,9 @@ TEST(DaemonReplayOfCameras, EveryImageHasTheSameBits) {
                   5.0, 1e-12);
       EXPECT_EQ(of_side->header.width_px, 20U);
       EXPECT_NE(of_side->header.payload_crc32c, of_seeker->header.payload_crc32c);
+      EXPECT_EQ(of_seeker->header.quantity, protocol::PixelQuantity::counts);
+      EXPECT_EQ(of_seeker->header.output_steps,
+                protocol::kOutputBlurred | protocol::kOutputDetected | protocol::kOutputCounted);
     }
   }
   SourceScript script;

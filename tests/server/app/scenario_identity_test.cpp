@@ -67,6 +67,16 @@ TEST(ScenarioIdentity, FollowsTheFilesOfOutputsAndNotTheirFolder) {
   const std::string before = files->hash();
   files->scenario.channels[0].output.rotate_deg = 90;
   EXPECT_NE(files->hash(), before) << "settings count too";
+  const auto with_spot = [](const std::string& content) {
+    Files spotted;
+    spotted.folder.write("spot.exr", content);
+    spotted.scenario.channels = {{"a", scene::ChannelKind::injection, "8-12"}};
+    spotted.scenario.channels[0].output.optics.spot = scene::SpotKind::file;
+    spotted.scenario.channels[0].output.optics.spot_file = spotted.folder.file("spot.exr");
+    return spotted.hash();
+  };
+  EXPECT_EQ(with_spot("one"), with_spot("one"));
+  EXPECT_NE(with_spot("one"), with_spot("two"));
 }
 
 TEST(ScenarioIdentity, FollowsBuffersBesideAGltfFile) {

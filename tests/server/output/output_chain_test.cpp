@@ -59,7 +59,7 @@ TEST(OutputChain, AllSixteenMirrorsAndRotationsMoveEveryPixelToItsPlace) {
       scene::ChannelOutput settings;
       settings.mirror = mirror;
       settings.rotate_deg = rotate_deg;
-      const auto chain = OutputChain::make(settings, {kImage, kWindow, 0.0});
+      auto chain = OutputChain::make(settings, {kImage, kWindow, 0.0});
       ASSERT_TRUE(chain.has_value()) << chain.error().text;
       const bool lies = rotate_deg == 90 || rotate_deg == 270;
       const ImageSize frame{lies ? 4U : 5U, lies ? 5U : 4U};
@@ -90,7 +90,7 @@ TEST(OutputChain, ARotatedPictureLargerThanABlockIsWhole) {
   const auto image = image_of(size, [](double x, double y) { return 100.0 * y + x; });
   scene::ChannelOutput settings;
   settings.rotate_deg = 90;
-  const auto chain = OutputChain::make(settings, {size, {0, 0, 70, 45}, 0.0});
+  auto chain = OutputChain::make(settings, {size, {0, 0, 70, 45}, 0.0});
   ASSERT_TRUE(chain.has_value());
   const std::vector<float> out = made(*chain, image);
   for (std::uint32_t y = 0; y < 70; ++y) {
@@ -111,13 +111,13 @@ TEST(OutputChain, AMapOfWholePixelsCopiesBitsInEveryOrientation) {
       scene::ChannelOutput settings;
       settings.mirror = mirror;
       settings.rotate_deg = rotate_deg;
-      const auto turned = OutputChain::make(settings, {kImage, kWindow, 0.0});
+      auto turned = OutputChain::make(settings, {kImage, kWindow, 0.0});
       ASSERT_TRUE(turned.has_value());
       settings.distortion_file =
           folder.map("identity.exr", turned->frame(), [](double x, double y) {
             return ImagePoint{x, y};
           });
-      const auto mapped = OutputChain::make(settings, {kImage, kWindow, 0.0});
+      auto mapped = OutputChain::make(settings, {kImage, kWindow, 0.0});
       ASSERT_TRUE(mapped.has_value()) << mapped.error().text;
       EXPECT_EQ(mapped->outside_px(), 0U);
       EXPECT_EQ(mapped->steps(), turned->steps() | protocol::kOutputDistorted);
@@ -147,7 +147,7 @@ TEST(OutputChain, AKnownWarpOfASmoothPictureIsWithinTheErrorOfBilinearSampling) 
   scene::ChannelOutput settings;
   settings.distortion_file =
       folder.map("warp.exr", {80, 50}, [&](double x, double y) { return warp(x + 8.0, y + 7.0); });
-  const auto chain = OutputChain::make(settings, {size, {0, 0, 96, 64}, 0.0});
+  auto chain = OutputChain::make(settings, {size, {0, 0, 96, 64}, 0.0});
   ASSERT_TRUE(chain.has_value()) << chain.error().text;
   ASSERT_EQ(chain->frame(), (ImageSize{80, 50})) << "the frame has the size of the map";
   EXPECT_EQ(chain->outside_px(), 0U);
@@ -177,7 +177,7 @@ TEST(OutputChain, APlaneSurvivesResamplingExactly) {
   settings.distortion_file = folder.map("plane.exr", {3, 4}, [](double x, double y) {
     return ImagePoint{x + 0.125, y + 0.25};
   });
-  const auto chain = OutputChain::make(settings, {kImage, kWindow, 0.0});
+  auto chain = OutputChain::make(settings, {kImage, kWindow, 0.0});
   ASSERT_TRUE(chain.has_value()) << chain.error().text;
   const std::vector<float> out = made(*chain, image);
   for (std::uint32_t y = 0; y < 4; ++y) {
@@ -199,7 +199,7 @@ TEST(OutputChain, PixelsThatPointNowhereGetTheirValueAndAreCounted) {
   settings.distortion_file = folder.map("wide.exr", {7, 4}, [](double x, double y) {
     return ImagePoint{x == 3.5 && y == 0.5 ? NAN : x - 1.0, y};
   });
-  const auto chain = OutputChain::make(settings, {kImage, kWindow, 0.0});
+  auto chain = OutputChain::make(settings, {kImage, kWindow, 0.0});
   ASSERT_TRUE(chain.has_value()) << chain.error().text;
   EXPECT_EQ(chain->outside_px(), 9U);
   const std::vector<float> out = made(*chain, image);
@@ -215,7 +215,7 @@ TEST(OutputChain, AShiftMovesThePictureAndShowsTheSceneBesideTheWindow) {
   const auto image = image_of(size, plane);
   scene::ChannelOutput settings;
   settings.apply_shift = true;
-  const auto chain = OutputChain::make(settings, {size, {20, 20, 10, 8}, 0.0});
+  auto chain = OutputChain::make(settings, {size, {20, 20, 10, 8}, 0.0});
   ASSERT_TRUE(chain.has_value());
   EXPECT_EQ(chain->source_px(), (scene::PixelRect{4, 4, 42, 40}));
   for (const glm::vec2 shift_px :
@@ -241,9 +241,9 @@ TEST(OutputChain, AShiftIsThatOfTheSensorsImageHoweverThePictureLies) {
       settings.mirror = mirror;
       settings.rotate_deg = rotate_deg;
       const scene::PixelRect moved{20 - 3, 20 + 2, 10, 8};
-      const auto turned = OutputChain::make(settings, {size, moved, 0.0});
+      auto turned = OutputChain::make(settings, {size, moved, 0.0});
       settings.apply_shift = true;
-      const auto chain = OutputChain::make(settings, {size, {20, 20, 10, 8}, 0.0});
+      auto chain = OutputChain::make(settings, {size, {20, 20, 10, 8}, 0.0});
       ASSERT_TRUE(chain.has_value() && turned.has_value());
       EXPECT_EQ(made(*chain, image, {3.0F, -2.0F}), made(*turned, image))
           << static_cast<int>(mirror) << ", " << rotate_deg;
@@ -258,7 +258,7 @@ TEST(OutputChain, AShiftLeavesAloneWhatDoesNotAskForIt) {
   settings.distortion_file = folder.map("same.exr", {5, 4}, [](double x, double y) {
     return ImagePoint{x, y};
   });
-  const auto chain = OutputChain::make(settings, {kImage, kWindow, 0.0});
+  auto chain = OutputChain::make(settings, {kImage, kWindow, 0.0});
   ASSERT_TRUE(chain.has_value());
   EXPECT_EQ(made(*chain, image, {1.5F, -0.5F}), made(*chain, image));
 }
@@ -268,7 +268,7 @@ TEST(OutputChain, AShiftBeyondTheImageShowsTheOutsideValue) {
   scene::ChannelOutput settings;
   settings.apply_shift = true;
   settings.outside_w_m2_sr = 1.0;
-  const auto chain = OutputChain::make(settings, {kImage, {0, 0, 11, 9}, 0.0});
+  auto chain = OutputChain::make(settings, {kImage, {0, 0, 11, 9}, 0.0});
   ASSERT_TRUE(chain.has_value());
   const std::vector<float> out = made(*chain, image, {2.0F, 0.0F});
   for (std::uint32_t i = 0; i < 99; ++i) EXPECT_EQ(out[i], i % 11 < 2 ? 1.0F : 7.0F) << i;
@@ -294,7 +294,7 @@ TEST(OutputChain, APolynomialIsAppliedToThePicture) {
   const auto image = image_of(size, plane);
   scene::ChannelOutput settings;
   settings.distortion_radial = {-0.3, 0.0, 0.0};
-  const auto chain = OutputChain::make(settings, {size, {0, 0, 64, 48}, 80.0});
+  auto chain = OutputChain::make(settings, {size, {0, 0, 64, 48}, 80.0});
   ASSERT_TRUE(chain.has_value()) << chain.error().text;
   EXPECT_EQ(chain->outside_px(), 0U) << "a barrel draws its source from within";
   const std::vector<float> out = made(*chain, image);
@@ -302,7 +302,7 @@ TEST(OutputChain, APolynomialIsAppliedToThePicture) {
   const double scale = 1.0 - 0.3 * r2;
   EXPECT_NEAR(out[34 * 64 + 47], plane(32.0 + 15.5 * scale, 24.0 + 10.5 * scale), 1e-5);
   settings.distortion_radial = {0.3, 0.0, 0.0};
-  const auto cushion = OutputChain::make(settings, {size, {0, 0, 64, 48}, 80.0});
+  auto cushion = OutputChain::make(settings, {size, {0, 0, 64, 48}, 80.0});
   ASSERT_TRUE(cushion.has_value());
   EXPECT_GT(cushion->outside_px(), 0U);
   EXPECT_FALSE(OutputChain::make(settings, {size, {0, 0, 64, 48}, 0.0}).has_value())
@@ -318,17 +318,17 @@ TEST(OutputChain, GainAndOffsetThenTheDriveTableComeLast) {
       folder.exr("nuc.exr", {5, 4},
                  {{"gain", [](double x, double y) { return 1.0 + 0.125 * x + 0.0 * y; }},
                   {"offset", [](double x, double y) { return -0.5 * y + 0.0 * x; }}});
-  const auto corrected = OutputChain::make(settings, {kImage, kWindow, 0.0});
+  auto corrected = OutputChain::make(settings, {kImage, kWindow, 0.0});
   ASSERT_TRUE(corrected.has_value()) << corrected.error().text;
   EXPECT_EQ(corrected->steps(), protocol::kOutputRotated180 | protocol::kOutputCorrected);
   settings.drive_table_file =
       folder.text("drive.csv", "radiance_w_m2_sr,drive\n40,0\n60,1000\n90,4000\n");
-  const auto driven = OutputChain::make(settings, {kImage, kWindow, 0.0});
+  auto driven = OutputChain::make(settings, {kImage, kWindow, 0.0});
   ASSERT_TRUE(driven.has_value()) << driven.error().text;
   EXPECT_EQ(driven->steps(), corrected->steps() | protocol::kOutputDriven);
   const std::vector<float> commands = made(*corrected, image);
   std::vector<float> drives(20);
-  const std::uint32_t clamped = driven->apply(image, glm::vec2(0.0F), drives);
+  const std::uint32_t clamped = driven->apply(image, {}, drives);
   std::uint32_t expected_clamped = 0;
   for (std::uint32_t y = 0; y < 4; ++y) {
     for (std::uint32_t x = 0; x < 5; ++x) {
@@ -346,10 +346,55 @@ TEST(OutputChain, GainAndOffsetThenTheDriveTableComeLast) {
   EXPECT_EQ(clamped, expected_clamped);
 }
 
+TEST(OutputChain, OpticsAndDetectorComeBeforeCorrectionInTheirOrder) {
+  const ImageSize size{64, 48};
+  const auto image =
+      image_of(size, [](double x, double y) { return 20.0 + std::hypot(x - 20.0, y - 30.0); });
+  const OutputChain::Origin origin{size, {10, 8, 30, 30}, 50.0, physics::Band{8.0, 12.0, {}}};
+  scene::ChannelOutput settings;
+  settings.optics = {.spot = scene::SpotKind::gaussian, .sigma_px = 1.0};
+  auto blurred = OutputChain::make(settings, origin);
+  ASSERT_TRUE(blurred.has_value()) << blurred.error().text;
+  EXPECT_EQ(blurred->steps(), protocol::kOutputBlurred);
+  EXPECT_EQ(blurred->source_px(), (scene::PixelRect{5, 3, 40, 40}))
+      << "the renderer draws what the spot reaches";
+  // The cone has no curvature but at its tip, so that a spot leaves it alone elsewhere, about.
+  const std::vector<float> soft = made(*blurred, image);
+  EXPECT_NEAR(soft[2 * 30 + 25], image[10 * 64 + 35], 0.03);
+  EXPECT_GT(soft[22 * 30 + 10], image[30 * 64 + 20] + 0.5F) << "the tip is filled";
+  settings.optics.vignetting = true;
+  auto dimmed = OutputChain::make(settings, origin);
+  ASSERT_TRUE(dimmed.has_value());
+  const std::vector<float> dim = made(*dimmed, image);
+  // Pixel (0, 0) of the window lies at 10.5, 8.5, 21.5 and 15.5 px from the axis at 32, 24.
+  const double cos2 = 1.0 / (1.0 + (21.5 * 21.5 + 15.5 * 15.5) / 2500.0);
+  EXPECT_NEAR(dim[0], static_cast<double>(soft[0]) * cos2 * cos2, 1e-5);
+  EXPECT_FALSE(OutputChain::make(settings, {size, origin.window_px, 0.0}).has_value());
+  settings.detector.netd_k = 0.2;
+  auto noisy = OutputChain::make(settings, origin);
+  ASSERT_TRUE(noisy.has_value());
+  EXPECT_EQ(noisy->steps(), protocol::kOutputBlurred | protocol::kOutputDetected);
+  std::vector<float> one(900);
+  std::vector<float> again(900);
+  std::vector<float> next(900);
+  static_cast<void>(noisy->apply(image, {{}, 5}, one));
+  static_cast<void>(noisy->apply(image, {{}, 6}, next));
+  static_cast<void>(noisy->apply(image, {{}, 5}, again));
+  EXPECT_EQ(one, again);
+  EXPECT_NE(one, next);
+  double squares = 0.0;
+  for (std::size_t i = 0; i < one.size(); ++i) {
+    squares += std::pow(static_cast<double>(one[i]) - static_cast<double>(dim[i]), 2) / 900.0;
+  }
+  EXPECT_NEAR(std::sqrt(squares), 0.2 * 0.645, 0.1 * 0.2 * 0.645);
+  EXPECT_FALSE(OutputChain::make(settings, {size, origin.window_px, 50.0}).has_value())
+      << "kelvin need a band";
+}
+
 TEST(OutputChain, FaultsOfFilesAreNamed) {
   OutputFiles folder;
   const auto error_of = [](const scene::ChannelOutput& settings) {
-    const auto chain = OutputChain::make(settings, {kImage, kWindow, 0.0});
+    auto chain = OutputChain::make(settings, {kImage, kWindow, 0.0});
     return chain ? std::string("none") : chain.error().text;
   };
   const auto constant = [](double value) { return [value](double, double) { return value; }; };

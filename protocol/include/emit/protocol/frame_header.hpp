@@ -28,12 +28,14 @@ enum class PixelQuantity : std::uint8_t {
   /// Command for an emitter of a projector: radiance after a correction of non-uniformity, or the
   /// drive that a table of the channel gives for it. It is not the radiance of the scene.
   drive = 3,
+  /// Digital numbers of a detector: whole numbers from 0 to the full scale of its converter.
+  counts = 4,
 };
 
 /// Steps that the pixels went through after they were cut out of the sensor's image, as bits. A
 /// frame with one of the first five has no window in its header: its pixels do not lie as in the
 /// sensor's image. docs/wire.md section 3 says where they come from.
-enum OutputSteps : std::uint8_t {
+enum OutputSteps : std::uint16_t {
   kOutputMirroredHorizontally = 1u << 0,  ///< columns are in reverse order
   kOutputMirroredVertically = 1u << 1,    ///< rows are in reverse order
   kOutputRotated90 = 1u << 2,             ///< rotated clockwise by 90 degrees, after the mirror
@@ -42,11 +44,14 @@ enum OutputSteps : std::uint8_t {
   kOutputShifted = 1u << 5,               ///< moved by applied_shift_*_px
   kOutputCorrected = 1u << 6,             ///< gain and offset of each pixel were applied
   kOutputDriven = 1u << 7,                ///< a table made drive of radiance
+  kOutputBlurred = 1u << 8,               ///< convolved with the spot of the channel's optics
+  kOutputDetected = 1u << 9,              ///< fixed pattern and noise of the channel's detector
+  kOutputCounted = 1u << 10,              ///< a converter made counts of radiance
 };
 /// Steps after which a pixel's place no longer tells its place in the sensor's image.
-inline constexpr std::uint8_t kOutputMoved = kOutputMirroredHorizontally |
-                                             kOutputMirroredVertically | kOutputRotated90 |
-                                             kOutputRotated180 | kOutputDistorted;
+inline constexpr std::uint16_t kOutputMoved = kOutputMirroredHorizontally |
+                                              kOutputMirroredVertically | kOutputRotated90 |
+                                              kOutputRotated180 | kOutputDistorted;
 
 /// Encoding of the pixels on the wire. Only clients that asked for another encoding than raw
 /// receive one.
@@ -175,8 +180,8 @@ struct FrameHeader {
   /// Projector: error of direction that the shift left in the centre of the newest frame whose
   /// axes were measured up to its display. NaN: none was.
   float pointing_error_px = 0.0F;
-  std::int64_t display_ns = 0;    ///< wall instant for which the axes were predicted
-  std::uint8_t output_steps = 0;  ///< OutputSteps
+  std::int64_t display_ns = 0;     ///< wall instant for which the axes were predicted
+  std::uint16_t output_steps = 0;  ///< OutputSteps
   /// Shift that emitd has applied, with kOutputShifted; right and down in the sensor's image.
   float applied_shift_x_px = 0.0F;
   float applied_shift_y_px = 0.0F;

@@ -23,12 +23,12 @@ struct ImageSize {
 };
 
 /// Returns whether the steps exchange rows and columns. RT-safe.
-[[nodiscard]] constexpr bool exchanges_sides(std::uint8_t output_steps) noexcept {
+[[nodiscard]] constexpr bool exchanges_sides(std::uint16_t output_steps) noexcept {
   return (output_steps & kOutputRotated90) != 0;
 }
 
 /// Returns the size of a window's picture after mirror and rotation. RT-safe.
-[[nodiscard]] constexpr ImageSize turned_size(std::uint8_t output_steps,
+[[nodiscard]] constexpr ImageSize turned_size(std::uint16_t output_steps,
                                               const ImageSize& window) noexcept {
   return exchanges_sides(output_steps) ? ImageSize{window.height_px, window.width_px} : window;
 }
@@ -37,7 +37,7 @@ struct ImageSize {
 /// With w and h for the size of the window, a rotation takes (x, y) to (x, y) for 0 degrees,
 /// (y, h - x) for 90, (w - x, h - y) for 180 and (w - y, x) for 270. A mirror then takes x to
 /// w - x, or y to h - y. The other steps play no part. RT-safe.
-[[nodiscard]] constexpr ImagePoint window_point(std::uint8_t output_steps, const ImageSize& window,
+[[nodiscard]] constexpr ImagePoint window_point(std::uint16_t output_steps, const ImageSize& window,
                                                 const ImagePoint& turned) noexcept {
   const double w = window.width_px;
   const double h = window.height_px;

@@ -12,7 +12,7 @@ from .errors import ProtocolError
 FRAME_HEADER_BYTES = 384
 _MAGIC = 0x524D4645
 _VERSION = 2
-_LAYOUT = struct.Struct("<I4BHHIIffIfIIIQQQQ10qQ3d4dBBBxfqqQffIIIIIIBB2xfffqff60xI")
+_LAYOUT = struct.Struct("<I4BHHIIffIfIIIQQQQ10qQ3d4dBBHfqqQffIIIIIIBB2xfffqff60xI")
 assert _LAYOUT.size == FRAME_HEADER_BYTES
 
 FLAG_NAMES = (
@@ -22,14 +22,14 @@ FLAG_BITS = {name: 1 << bit for bit, name in enumerate(FLAG_NAMES)}
 # Only a receiver may set these flags. It clears them where a sender set them.
 RECEIVER_FLAG_BITS = FLAG_BITS["partial"] | FLAG_BITS["corrupt"] | FLAG_BITS["lost_before"]
 
-_QUANTITIES = {1: "radiance_w_m2_sr", 2: "temperature_k", 3: "drive"}
+_QUANTITIES = {1: "radiance_w_m2_sr", 2: "temperature_k", 3: "drive", 4: "counts"}
 _CHANNEL_KINDS = {0: "injection", 1: "projector"}
 _MOTION_STATES = ("none", "waiting", "parked", "parking", "capturing", "following", "fault")
 _MOTION_FAULTS = ("no_feedback", "no_host", "interlock", "limit", "lock", "clock", "controller_clock", "ignored")
 _ENCODINGS = {0: "raw", 1: "shuffled_lz4"}
 # What was done to the pixels after they were cut out of the sensor's image, by bit of `output_step_bits`.
 OUTPUT_STEP_NAMES = ("mirrored_horizontally", "mirrored_vertically", "rotated_90", "rotated_180", "distorted",
-                     "shifted", "corrected", "driven")
+                     "shifted", "corrected", "driven", "blurred", "detected", "counted")
 
 
 @functools.lru_cache(maxsize=256)
@@ -45,7 +45,7 @@ class FrameHeader:
     Wall instants are ns of TAI (UTC with the flag time_unset); 0 means that the event did not happen.
     """
 
-    quantity: str  # "radiance_w_m2_sr", "temperature_k" or "drive"
+    quantity: str  # "radiance_w_m2_sr", "temperature_k", "drive" or "counts"
     channel_kind: str  # "injection" or "projector"
     channel_index: int
     width_px: int

@@ -76,6 +76,7 @@ void set_frame_metadata(ExrImage& image, const FrameMetadata& metadata);
 inline constexpr char kRadianceChannel[] = "radiance";        ///< W m-2 sr-1 in the band
 inline constexpr char kTemperatureChannel[] = "temperature";  ///< K; NaN in the sky
 inline constexpr char kDriveChannel[] = "drive";              ///< command of a projector's emitter
+inline constexpr char kCountsChannel[] = "counts";            ///< whole numbers of a detector
 inline constexpr char kDepthChannel[] = "depth";    ///< m along the boresight; +Inf in the sky
 inline constexpr char kObjectChannel[] = "object";  ///< object id; 0 in the sky
 /// Share of the pixel that small targets cover, 0..1; optional.
