@@ -219,7 +219,8 @@ HeaderFault parse_frame_header(std::span<const std::byte> bytes, FrameHeader& he
   if (quantity != static_cast<std::uint8_t>(PixelQuantity::radiance_w_m2_sr) &&
       quantity != static_cast<std::uint8_t>(PixelQuantity::temperature_k) &&
       quantity != static_cast<std::uint8_t>(PixelQuantity::drive) &&
-      quantity != static_cast<std::uint8_t>(PixelQuantity::counts)) {
+      quantity != static_cast<std::uint8_t>(PixelQuantity::counts) &&
+      quantity != static_cast<std::uint8_t>(PixelQuantity::photon_radiance)) {
     return HeaderFault::quantity;
   }
   const auto encoding = wire::get<std::uint8_t>(bytes, kEncodingAt);

@@ -17,14 +17,6 @@ std::string_view to_string(scene::ChannelKind kind) noexcept {
   return kind == scene::ChannelKind::projector ? "projector" : "injection";
 }
 
-protocol::PixelQuantity quantity_of(const Channel& channel) noexcept {
-  using protocol::PixelQuantity;
-  if ((channel.output_steps & protocol::kOutputCounted) != 0) return PixelQuantity::counts;
-  constexpr std::uint16_t kCommands = protocol::kOutputCorrected | protocol::kOutputDriven;
-  return (channel.output_steps & kCommands) != 0 ? PixelQuantity::drive
-                                                 : PixelQuantity::radiance_w_m2_sr;
-}
-
 namespace {
 
 /// Takes the memory of an image whose pixels are not used where they lie in the source's memory.
@@ -45,7 +37,7 @@ double focal_px_of(const std::optional<scene::ScenarioDesc>& scenario, const Cam
 
 /// Makes the output of an image, where it has one, and its size.
 physics::Result<void> make_output(Picture& picture, const protocol::ImageSize& image,
-                                  double focal_px, const std::optional<physics::Band>& band) {
+                                  double focal_px, const std::optional<scene::SpectralBand>& band) {
   picture.size = {picture.window_px.width_px, picture.window_px.height_px};
   if (picture.output == scene::ChannelOutput{}) return {};
   auto chain = OutputChain::make(picture.output, {image, picture.window_px, focal_px, band});
@@ -105,7 +97,10 @@ physics::Result<ChannelTable> make_channels(const std::optional<scene::ScenarioD
     channel.band = band.name;
     channel.band_lo_um = band.lo_um;
     channel.band_hi_um = band.hi_um;
-    channel.response = band.response;
+    channel.response.clear();
+    for (const physics::ResponsePoint& point : scene::spectral_band(band).response) {
+      channel.response.push_back({point.wavelength_um, point.response_frac});
+    }
     channel.window_px = window;
     channel.sensor_width_px = source.width_px;
     channel.sensor_height_px = source.height_px;
@@ -158,8 +153,8 @@ physics::Result<ChannelTable> make_channels(const std::optional<scene::ScenarioD
       Picture& picture = table.pictures[channel.picture];
       if (picture.pixels() == 0) {
         const double focal_px = focal_px_of(scenario, table.cameras[picture.camera]);
-        std::optional<physics::Band> band;
-        if (scenario) band = scene::spectral_band(scenario->bands[picture.plane]);
+        std::optional<scene::SpectralBand> band;
+        if (scenario) band = scenario->bands[picture.plane];
         if (auto made = make_output(picture, {source.width_px, source.height_px}, focal_px, band);
             !made) {
           return tl::unexpected(
@@ -171,6 +166,7 @@ physics::Result<ChannelTable> make_channels(const std::optional<scene::ScenarioD
       channel.width_px = picture.size.width_px;
       channel.height_px = picture.size.height_px;
       channel.source_px = picture.chain ? picture.chain->source_px() : picture.window_px;
+      if (picture.chain) channel.quantity = picture.chain->quantity();
       channel.output_steps = picture.chain ? picture.chain->steps() : std::uint16_t{0};
     }
     return std::move(table);

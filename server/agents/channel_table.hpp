@@ -29,6 +29,7 @@ struct Channel {
   scene::PixelRect window_px;      ///< part of the sensor's image that its frames show
   scene::PixelRect source_px;      ///< part that they are made of: the window and what is around it
   std::uint16_t output_steps = 0;  ///< protocol::OutputSteps
+  protocol::PixelQuantity quantity = protocol::PixelQuantity::radiance_w_m2_sr;
   std::uint32_t sensor_width_px = 0;
   std::uint32_t sensor_height_px = 0;
   std::uint32_t every_nth = 1;  ///< shows frames 1, 1 + n, 1 + 2 n, ... of every run
@@ -69,9 +70,6 @@ struct ChannelTable {
 };
 
 [[nodiscard]] std::string_view to_string(scene::ChannelKind kind) noexcept;
-
-/// Returns what the pixels of a channel's frames are. RT-safe.
-[[nodiscard]] protocol::PixelQuantity quantity_of(const Channel& channel) noexcept;
 
 /// Returns the cameras of a scenario's channels, in the order of their first channels. Without
 /// channels it is one.

@@ -19,7 +19,7 @@ namespace {
 using Out = std::back_insert_iterator<std::string>;
 
 bool has_radiance(const Channel& channel) noexcept {
-  return quantity_of(channel) == protocol::PixelQuantity::radiance_w_m2_sr;
+  return channel.quantity == protocol::PixelQuantity::radiance_w_m2_sr;
 }
 
 physics::Band band_of(const Channel& channel) {

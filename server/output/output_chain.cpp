@@ -21,6 +21,9 @@ namespace {
 /// Rows that pass through all steps together, so that they stay in the cache. A picture that was
 /// turned by 90 degrees reads as many neighbours of a row in memory.
 constexpr std::uint32_t kRowsAtOnce = 16;
+/// Range of apparent temperatures; pixels beyond are counted as clamped.
+constexpr double kApparentFromK = 150.0;
+constexpr double kApparentToK = 3000.0;
 
 /// Returns whether a detector changes radiance before its converter.
 bool detects(const scene::ChannelDetector& detector) noexcept {
@@ -149,7 +152,9 @@ Result<OutputChain> OutputChain::make(const scene::ChannelOutput& settings, cons
     out.vignetting_frac_ = vignetting_of(out.steps_, out.frame_, origin);
   }
   if ((out.steps_ & (protocol::kOutputDetected | protocol::kOutputCounted)) != 0) {
-    auto detector = Detector::make(settings.detector, origin.band, out.frame_);
+    std::optional<physics::Band> band;
+    if (origin.band) band = scene::spectral_band(*origin.band);
+    auto detector = Detector::make(settings.detector, band, out.frame_);
     if (!detector) return tl::unexpected(std::move(detector.error()));
     out.detector_ = std::move(*detector);
   }
@@ -163,7 +168,53 @@ Result<OutputChain> OutputChain::make(const scene::ChannelOutput& settings, cons
     if (!table) return tl::unexpected(std::move(table.error()).with_context("drive_table_file"));
     out.table_ = std::move(*table);
   }
+  if (auto chosen = out.choose_quantity(settings, origin); !chosen) {
+    return tl::unexpected(std::move(chosen.error()));
+  }
   return out;
+}
+
+Result<void> OutputChain::choose_quantity(const scene::ChannelOutput& settings,
+                                          const Origin& origin) {
+  using protocol::PixelQuantity;
+  if ((steps_ & protocol::kOutputCounted) != 0) {
+    quantity_ = PixelQuantity::counts;
+  } else if ((steps_ & (protocol::kOutputCorrected | protocol::kOutputDriven)) != 0) {
+    quantity_ = PixelQuantity::drive;
+  }
+  if (settings.quantity == scene::PictureQuantity::radiance) return {};
+  if (!origin.band) {
+    return make_error(ErrorCode::config, "another quantity than radiance needs a scenario's band");
+  }
+  if (settings.quantity == scene::PictureQuantity::photon_radiance) {
+    quantity_ = PixelQuantity::photon_radiance;
+    photons_per_joule_ = static_cast<float>(scene::photons_per_joule(*origin.band));
+    return {};
+  }
+  quantity_ = PixelQuantity::temperature_k;
+  const physics::Band band = scene::spectral_band(*origin.band);
+  apparent_.emplace(band);
+  const auto radiance_at = [&](double kelvin) {
+    return static_cast<float>(
+        physics::band_radiance(band, physics::Kelvin(kelvin)).radiance_w_m2_sr);
+  };
+  apparent_from_w_m2_sr_ = radiance_at(kApparentFromK);
+  apparent_to_w_m2_sr_ = radiance_at(kApparentToK);
+  return {};
+}
+
+std::uint32_t OutputChain::convert_line(std::span<float> line) const noexcept {
+  if (quantity_ == protocol::PixelQuantity::photon_radiance) {
+    for (float& value : line) value *= photons_per_joule_;
+    return 0;
+  }
+  if (!apparent_) return 0;
+  std::uint32_t beyond = 0;
+  for (float& value : line) {
+    beyond += value >= apparent_from_w_m2_sr_ && value <= apparent_to_w_m2_sr_ ? 0U : 1U;
+    value = apparent_->k(value);
+  }
+  return beyond;
 }
 
 void OutputChain::turn_rows(std::span<const float> image, std::uint32_t first, std::uint32_t end,
@@ -214,6 +265,7 @@ std::uint32_t OutputChain::apply(std::span<const float> image, const Moment& mom
       if (detector_) clamped += detector_->apply_line(row, line);
       if (gain_) gain_->apply_line(row, line);
       if (table_) clamped += table_->apply(line);
+      clamped += convert_line(line);
     }
   }
   return clamped;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "emit/physics/error.hpp"
+#include "emit/physics/apparent_temperature.hpp"
 #include "emit/physics/planck.hpp"
 #include "emit/protocol/output_geometry.hpp"
 #include "emit/scene/scene_desc.hpp"
@@ -32,7 +33,7 @@ class OutputChain {
     protocol::ImageSize image;
     scene::PixelRect window_px;
     double focal_px = 0.0;                   ///< focal length of the image; 0: not known
-    std::optional<physics::Band> band = {};  ///< of the radiance; empty: not known
+    std::optional<scene::SpectralBand> band = {};  ///< of the radiance; empty: not known
   };
   /// What distinguishes one frame from another.
   struct Moment {
@@ -54,6 +55,8 @@ class OutputChain {
   [[nodiscard]] const protocol::ImageSize& frame() const noexcept { return frame_; }
   /// Returns what is done, as protocol::OutputSteps.
   [[nodiscard]] std::uint16_t steps() const noexcept { return steps_; }
+  /// Returns what the pixels of the frames are.
+  [[nodiscard]] protocol::PixelQuantity quantity() const noexcept { return quantity_; }
   /// Returns the part of the image that the frames are made of: the window with its margin.
   [[nodiscard]] const scene::PixelRect& source_px() const noexcept {
     return spot_ ? spot_->reads_px() : source_px_;
@@ -64,13 +67,18 @@ class OutputChain {
   /// Writes a frame.
   /// @param image  radiance of the whole image, by row
   /// @param out    the frame, by row
-  /// @return how many pixels the drive table or the detector's converter has clamped
+  /// @return how many pixels the drive table, the detector's converter or the table of apparent
+  /// temperatures has clamped
   /// @pre out has the size of frame()
   std::uint32_t apply(std::span<const float> image, const Moment& moment,
                       std::span<float> out) noexcept;
 
  private:
   OutputChain() = default;
+  /// Chooses what the pixels are at the end. Errors: config, when there is no band.
+  physics::Result<void> choose_quantity(const scene::ChannelOutput& settings, const Origin& origin);
+  /// Makes the quantity of a row of radiance. Returns how many pixels are outside its range.
+  std::uint32_t convert_line(std::span<float> line) const noexcept;
   /// Writes rows of the window, mirrored and rotated.
   void turn_rows(std::span<const float> image, std::uint32_t first, std::uint32_t end,
                  std::span<float> out) const noexcept;
@@ -88,6 +96,11 @@ class OutputChain {
   std::optional<Detector> detector_;
   std::optional<PixelGain> gain_;
   std::optional<DriveTable> table_;
+  protocol::PixelQuantity quantity_ = protocol::PixelQuantity::radiance_w_m2_sr;
+  std::optional<physics::ApparentTemperature> apparent_;
+  float apparent_from_w_m2_sr_ = 0.0F;  // radiances at the ends of its table
+  float apparent_to_w_m2_sr_ = 0.0F;
+  float photons_per_joule_ = 0.0F;
 };
 
 }  // namespace emit::server

@@ -195,6 +195,15 @@ const std::vector<Case>& cases() {
       {"shift_of_an_injected_image",
        "[[channel]]\nname = \"a\"\nband = \"3-5\"\napply_shift = true\n",
        "s.toml:5:15: 'apply_shift' needs kind = \"projector\": an injected image has no shift"},
+      {"photons_of_a_power_band",
+       "[[channel]]\nname = \"a\"\nband = \"3-5\"\nquantity = \"photon_radiance\"\n",
+       "s.toml:5:12: \"photon_radiance\" needs a [[band]] with photons = true, and '3-5' has a "
+       "response per power"},
+      {"temperature_of_drive",
+       "[[channel]]\nname = \"a\"\nband = \"3-5\"\nquantity = \"apparent_temperature\"\n"
+       "nuc_file = \"n.exr\"\n",
+       "s.toml:5:12: 'quantity' is radiance where 'nuc_file', 'drive_table_file' or "
+       "'detector.counts_per_w_m2_sr' makes something else of it"},
       {"optics_of_a_projector",
        "[[channel]]\nname = \"a\"\nband = \"3-5\"\nkind = \"projector\"\n[channel.optics]\n"
        "vignetting = true\n",

@@ -119,6 +119,23 @@ void add_output_keys(KeyTable<ChannelDesc>& keys) {
       "of radiance."));
 }
 
+/// Adds the key of what the pixels are.
+void add_quantity_key(KeyTable<ChannelDesc>& keys) {
+  using scene::PictureQuantity;
+  keys.push_back(written_if<ChannelDesc>(
+      [](const ChannelDesc& in) { return in.output.quantity != PictureQuantity::radiance; },
+      choice<ChannelDesc>(
+          "quantity",
+          std::vector<std::pair<std::string, PictureQuantity>>{
+              {"radiance", PictureQuantity::radiance},
+              {"apparent_temperature", PictureQuantity::apparent_temperature},
+              {"photon_radiance", PictureQuantity::photon_radiance}},
+          EMIT_FIELD(output.quantity),
+          "What pixels are: radiance in the band (W m-2 sr-1), the temperature of a blackbody of "
+          "that radiance (K, 150 to 3000), or photons (s-1 m-2 sr-1), which needs a `[[band]]` "
+          "with `photons = true`.")));
+}
+
 /// Adds the tables of the optics and the detector.
 void add_detector_keys(KeyTable<ChannelDesc>& keys) {
   keys.push_back(custom<ChannelDesc>(
@@ -299,6 +316,7 @@ const KeyTable<ChannelDesc>& channel_keys() {
     add_camera_keys(all);
     add_output_keys(all);
     add_detector_keys(all);
+    add_quantity_key(all);
     return all;
   }();
   return keys;

@@ -472,6 +472,10 @@ const KeyTable<BandDraft>& band_keys() {
       written_if([](const BandDraft& in) { return in.desc.hi_um > 0.0; },
                  number<BandDraft>("hi_um", "um", between(0.2, 100), EMIT_FIELD(desc.hi_um),
                                    "Longest wavelength. Without it the response ends the band.")),
+      written_if([](const BandDraft& in) { return in.desc.photons; },
+                 boolean<BandDraft>("photons", EMIT_FIELD(desc.photons),
+                                    "The response is that per photon, as a photon detector has it. "
+                                    "Without it the response is per power.")),
       custom<BandDraft>(
           {"response", "array of [um, frac]", "um, 1", "2 or more, ascending, frac in 0 .. 1",
            "Relative spectral response, linear between its points. Without it the band is a "

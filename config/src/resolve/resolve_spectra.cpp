@@ -256,6 +256,30 @@ void check_optics(const Node& table, const ChannelDesc& channel, bool require_fi
   }
 }
 
+/// Reports a quantity that the channel cannot have.
+void check_quantity(const Node& table, const ChannelDesc& channel,
+                    const std::vector<SpectralBand>& bands, Diagnostics& diagnostics) {
+  using scene::PictureQuantity;
+  const scene::ChannelOutput& output = channel.output;
+  if (output.quantity == PictureQuantity::radiance) return;
+  const auto refuse = [&](const std::string& text) {
+    diagnostics.add(key_location(table, "quantity"), text);
+  };
+  if (!output.nuc_file.empty() || !output.drive_table_file.empty() ||
+      output.detector.counts_per_w_m2_sr > 0.0) {
+    refuse("'quantity' is radiance where 'nuc_file', 'drive_table_file' or "
+           "'detector.counts_per_w_m2_sr' makes something else of it");
+  }
+  const auto band =
+      std::ranges::find_if(bands, [&](const auto& one) { return one.name == channel.band; });
+  if (output.quantity == PictureQuantity::photon_radiance && band != bands.end() &&
+      !band->photons) {
+    refuse(fmt::format("\"photon_radiance\" needs a [[band]] with photons = true, and '{}' has a "
+                       "response per power",
+                       channel.band));
+  }
+}
+
 /// Reports settings of an output that make no sense together, and files that do not exist.
 void check_output(const Node& table, const ChannelDesc& channel, bool require_files,
                   Diagnostics& diagnostics) {
@@ -330,6 +354,7 @@ void check_channels(const Node& root, const scene::ScenarioDesc& scenario, bool 
                                   width_px, height_px));
     }
     check_output(section->items[i], scenario.channels[i], require_files, diagnostics);
+    check_quantity(section->items[i], scenario.channels[i], scenario.bands, diagnostics);
     check_camera(section->items[i], scenario.channels[i].camera, scenario, diagnostics);
     all_frames = all_frames || scenario.channels[i].every_nth == 1;
   }

@@ -30,7 +30,10 @@ double air_mass(double sin_elevation) {
 }  // namespace
 
 BandIntegral::BandIntegral(const scene::SpectralBand& band) {
-  std::vector<scene::ResponseSample> curve = band.response;
+  std::vector<scene::ResponseSample> curve;
+  for (const physics::ResponsePoint& point : scene::spectral_band(band).response) {
+    curve.push_back({point.wavelength_um, point.response_frac});
+  }
   if (curve.empty()) curve = {{band.lo_um, 1.0}, {band.hi_um, 1.0}};
   // Cut every stretch of the response into panels and put the points of the rule on each.
   for (std::size_t i = 0; i + 1 < curve.size(); ++i) {

@@ -68,7 +68,7 @@ protocol::FrameHeader SenderClient::header_for(const Channel& channel,
     out.shift_x_px -= image.shift_px.x;
     out.shift_y_px -= image.shift_px.y;
   }
-  out.quantity = quantity_of(channel);
+  out.quantity = channel.quantity;
   if (const std::uint32_t clamped_px = image.clamped_px[channel.picture]; clamped_px > 0) {
     out.clamped_px += clamped_px;
     out.flags |= protocol::kFlagClamped;

@@ -116,7 +116,7 @@ Result<void> OutputBench::add(std::string name, const scene::ChannelOutput& sett
   auto chain = server::OutputChain::make(settings, {{command_.width_px, command_.height_px},
                                                     {0, 0, command_.width_px, command_.height_px},
                                                     static_cast<double>(command_.width_px),
-                                                    physics::Band{8.0, 12.0, {}}});
+                                                    scene::SpectralBand{"8-12", 8.0, 12.0, {}}});
   if (!chain) return tl::unexpected(std::move(chain.error()));
   steps_.push_back({std::move(name), std::move(*chain)});
   return {};

@@ -63,15 +63,9 @@ physics::Result<void> save(const std::filesystem::path& directory,
   planes.output_steps = frame.header.output_steps;
   planes.applied_shift_x_px = frame.header.applied_shift_x_px;
   planes.applied_shift_y_px = frame.header.applied_shift_y_px;
-  const bool temperature = frame.header.quantity == protocol::PixelQuantity::temperature_k;
-  const bool drive = frame.header.quantity == protocol::PixelQuantity::drive;
-  const bool counts = frame.header.quantity == protocol::PixelQuantity::counts;
-  (drive         ? planes.drive
-   : counts      ? planes.counts
-   : temperature ? planes.temperature_k
-                 : planes.radiance_w_m2_sr) = frame.pixels;
+  plane_of(planes, frame.header.quantity) = frame.pixels;
   // The band of a channel does not change: one table serves every frame.
-  if (!temperature && !drive && !counts && !apparent) {
+  if (frame.header.quantity == protocol::PixelQuantity::radiance_w_m2_sr && !apparent) {
     if (const auto band = channel.spectral_band()) apparent.emplace(*band);
   }
   std::vector<float> valid;

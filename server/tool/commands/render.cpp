@@ -246,7 +246,7 @@ Json Rendering::show_output(const renderer::FrameView& view, FramePlanes& planes
   server::Picture& picture = plan_.output->pictures.front();
   const server::Channel& channel = plan_.output->channels.front();
   const server::TakenPicture taken = server::take_picture(picture, view, 0, glm::vec2(0.0F));
-  const protocol::PixelQuantity quantity = server::quantity_of(channel);
+  const protocol::PixelQuantity quantity = channel.quantity;
   planes.width_px = channel.width_px;
   planes.height_px = channel.height_px;
   planes.radiance_w_m2_sr = {};
@@ -254,9 +254,7 @@ Json Rendering::show_output(const renderer::FrameView& view, FramePlanes& planes
   planes.depth_m = {};
   planes.object_id = {};
   planes.coverage_frac = {};
-  (quantity == protocol::PixelQuantity::counts  ? planes.counts
-   : quantity == protocol::PixelQuantity::drive ? planes.drive
-                                                : planes.radiance_w_m2_sr) = taken.pixels;
+  plane_of(planes, quantity) = taken.pixels;
   planes.metadata.units = pixel_unit(quantity);
   planes.output_steps = channel.output_steps;
   if ((channel.output_steps & protocol::kOutputMoved) == 0) planes.window_px = picture.window_px;

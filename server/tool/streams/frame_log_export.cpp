@@ -81,10 +81,7 @@ Result<void> write_image(const std::filesystem::path& folder, const v1::Recorded
   FramePlanes planes;
   planes.width_px = frame.width_px();
   planes.height_px = frame.height_px();
-  (frame.unit() == "K"        ? planes.temperature_k
-   : frame.unit() == "drive"  ? planes.drive
-   : frame.unit() == "counts" ? planes.counts
-                              : planes.radiance_w_m2_sr) = pixels;
+  plane_of(planes, header->quantity) = pixels;
   planes.window_px = {header->window_x_px, header->window_y_px, header->width_px,
                       header->height_px};
   planes.sensor_width_px = header->sensor_width_px;

@@ -38,8 +38,25 @@ std::string_view pixel_unit(protocol::PixelQuantity quantity) noexcept {
       return "drive";
     case protocol::PixelQuantity::counts:
       return "counts";
+    case protocol::PixelQuantity::photon_radiance:
+      return "photons s-1 m-2 sr-1";
     default:
       return "W m-2 sr-1";
+  }
+}
+
+std::span<const float>& plane_of(FramePlanes& planes, protocol::PixelQuantity quantity) noexcept {
+  switch (quantity) {
+    case protocol::PixelQuantity::temperature_k:
+      return planes.temperature_k;
+    case protocol::PixelQuantity::drive:
+      return planes.drive;
+    case protocol::PixelQuantity::counts:
+      return planes.counts;
+    case protocol::PixelQuantity::photon_radiance:
+      return planes.photons;
+    default:
+      return planes.radiance_w_m2_sr;
   }
 }
 
@@ -74,6 +91,7 @@ physics::Result<void> write_frame_exr(const std::filesystem::path& file, const F
   add(image::kRadianceChannel, frame.radiance_w_m2_sr);
   add(image::kDriveChannel, frame.drive);
   add(image::kCountsChannel, frame.counts);
+  add(image::kPhotonsChannel, frame.photons);
   add(image::kTemperatureChannel, frame.temperature_k);
   add(image::kDepthChannel, frame.depth_m);
   add(image::kObjectChannel, frame.object_id);
@@ -132,6 +150,7 @@ PngValues ranged_values(std::span<const float> values, const std::string& unit) 
 physics::Result<PngValues> png_values(const FramePlanes& frame, const PngStyle& style) {
   if (!frame.drive.empty()) return ranged_values(frame.drive, "");
   if (!frame.counts.empty()) return ranged_values(frame.counts, "");
+  if (!frame.photons.empty()) return ranged_values(frame.photons, "");
   PngValues out;
   out.unit = "K";
   out.min_value = style.min_k;

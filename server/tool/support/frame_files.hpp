@@ -34,6 +34,7 @@ struct FramePlanes {
   std::span<const float> radiance_w_m2_sr;
   std::span<const float> temperature_k;
   std::span<const float> drive;   ///< command of a projector's emitters, in place of radiance
+  std::span<const float> photons;  ///< photon radiance, s-1 m-2 sr-1, in place of radiance
   std::span<const float> counts;  ///< what a detector's converter reads, in place of radiance
   std::span<const float> depth_m;
   std::span<const float> object_id;
@@ -56,9 +57,12 @@ struct FramePlanes {
   float applied_shift_y_px = 0.0F;
 };
 
-/// Returns the unit of a quantity as files and people write it: "W m-2 sr-1", "K", "drive" or
-/// "counts".
+/// Returns the unit of a quantity as files and people write it: "W m-2 sr-1", "K", "drive" 
+/// "counts" or "photons s-1 m-2 sr-1".
 [[nodiscard]] std::string_view pixel_unit(protocol::PixelQuantity quantity) noexcept;
+/// Returns the plane of a frame that holds a quantity.
+[[nodiscard]] std::span<const float>& plane_of(FramePlanes& planes,
+                                               protocol::PixelQuantity quantity) noexcept;
 /// Returns what protocol::OutputSteps say, for people: "mirror horizontal, rotate 90, shift". The
 /// text is empty where nothing was done.
 [[nodiscard]] std::string output_text(std::uint16_t output_steps);

@@ -58,8 +58,7 @@ class StreamProvider final : public FrameProvider {
       frame.width_px = header.width_px;
       frame.height_px = header.height_px;
       frame.radiance_w_m2_sr.assign(pixels.begin(), pixels.end());
-      frame.drive = header.quantity == protocol::PixelQuantity::drive ||
-                    header.quantity == protocol::PixelQuantity::counts;
+      frame.drive = header.quantity != protocol::PixelQuantity::radiance_w_m2_sr;
       if (apparent_ && !frame.drive) frame.temperature_k = apparent_->kelvin(pixels);
       frame.apparent_temperature = true;
       frame.frame_number = header.frame_number;

@@ -350,7 +350,7 @@ TEST(OutputChain, OpticsAndDetectorComeBeforeCorrectionInTheirOrder) {
   const ImageSize size{64, 48};
   const auto image =
       image_of(size, [](double x, double y) { return 20.0 + std::hypot(x - 20.0, y - 30.0); });
-  const OutputChain::Origin origin{size, {10, 8, 30, 30}, 50.0, physics::Band{8.0, 12.0, {}}};
+  const OutputChain::Origin origin{size, {10, 8, 30, 30}, 50.0, scene::SpectralBand{"8-12", 8.0, 12.0, {}}};
   scene::ChannelOutput settings;
   settings.optics = {.spot = scene::SpotKind::gaussian, .sigma_px = 1.0};
   auto blurred = OutputChain::make(settings, origin);
@@ -389,6 +389,40 @@ TEST(OutputChain, OpticsAndDetectorComeBeforeCorrectionInTheirOrder) {
   EXPECT_NEAR(std::sqrt(squares), 0.2 * 0.645, 0.1 * 0.2 * 0.645);
   EXPECT_FALSE(OutputChain::make(settings, {size, origin.window_px, 50.0}).has_value())
       << "kelvin need a band";
+}
+
+TEST(OutputChain, TheQuantityIsMadeLast) {
+  const ImageSize size{8, 4};
+  scene::SpectralBand band{"3-5", 3.0, 5.0, {}};
+  const OutputChain::Origin origin{size, {0, 0, 8, 4}, 0.0, band};
+  // A picture of blackbodies.
+  const std::vector<double> kelvin{160.0, 230.0, 300.0, 310.5, 400.0, 900.0, 2500.0, 2999.0};
+  std::vector<float> image;
+  for (int row = 0; row < 4; ++row) {
+    for (const double one : kelvin) {
+      image.push_back(static_cast<float>(
+          physics::band_radiance({3.0, 5.0, {}}, physics::Kelvin(one)).radiance_w_m2_sr));
+    }
+  }
+  image[8] = 0.0F;
+  image[9] = 1e6F;
+  scene::ChannelOutput settings;
+  settings.quantity = scene::PictureQuantity::apparent_temperature;
+  auto chain = OutputChain::make(settings, origin);
+  ASSERT_TRUE(chain.has_value());
+  EXPECT_EQ(chain->quantity(), protocol::PixelQuantity::temperature_k);
+  EXPECT_EQ(chain->steps(), 0);
+  std::vector<float> out(image.size());
+  EXPECT_EQ(chain->apply(image, {}, out), 2U) << "nothing is colder than the table, or hotter";
+  for (std::size_t i = 0; i < kelvin.size(); ++i) EXPECT_NEAR(out[i], kelvin[i], 0.02);
+  settings.quantity = scene::PictureQuantity::photon_radiance;
+  auto photons = OutputChain::make(settings, origin);
+  ASSERT_TRUE(photons.has_value());
+  EXPECT_EQ(photons->quantity(), protocol::PixelQuantity::photon_radiance);
+  EXPECT_EQ(photons->apply(image, {}, out), 0U);
+  // A photon of 5 um has 3.9729e-20 J.
+  EXPECT_NEAR(out[2] / (image[2] / 3.9728917e-20F), 1.0F, 1e-6F);
+  EXPECT_FALSE(OutputChain::make(settings, {size, {0, 0, 8, 4}, 0.0}).has_value());
 }
 
 TEST(OutputChain, FaultsOfFilesAreNamed) {

@@ -30,6 +30,7 @@ enum class PixelQuantity : std::uint8_t {
   drive = 3,
   /// Digital numbers of a detector: whole numbers from 0 to the full scale of its converter.
   counts = 4,
+  photon_radiance = 5,  ///< photons within the band, s-1 m-2 sr-1
 };
 
 /// Steps that the pixels went through after they were cut out of the sensor's image, as bits. A

@@ -22,7 +22,7 @@ FLAG_BITS = {name: 1 << bit for bit, name in enumerate(FLAG_NAMES)}
 # Only a receiver may set these flags. It clears them where a sender set them.
 RECEIVER_FLAG_BITS = FLAG_BITS["partial"] | FLAG_BITS["corrupt"] | FLAG_BITS["lost_before"]
 
-_QUANTITIES = {1: "radiance_w_m2_sr", 2: "temperature_k", 3: "drive", 4: "counts"}
+_QUANTITIES = {1: "radiance_w_m2_sr", 2: "temperature_k", 3: "drive", 4: "counts", 5: "photon_radiance"}
 _CHANNEL_KINDS = {0: "injection", 1: "projector"}
 _MOTION_STATES = ("none", "waiting", "parked", "parking", "capturing", "following", "fault")
 _MOTION_FAULTS = ("no_feedback", "no_host", "interlock", "limit", "lock", "clock", "controller_clock", "ignored")
@@ -45,7 +45,7 @@ class FrameHeader:
     Wall instants are ns of TAI (UTC with the flag time_unset); 0 means that the event did not happen.
     """
 
-    quantity: str  # "radiance_w_m2_sr", "temperature_k", "drive" or "counts"
+    quantity: str  # "radiance_w_m2_sr", "temperature_k", "drive", "counts" or "photon_radiance"
     channel_kind: str  # "injection" or "projector"
     channel_index: int
     width_px: int

@@ -77,6 +77,7 @@ inline constexpr char kRadianceChannel[] = "radiance";        ///< W m-2 sr-1 in
 inline constexpr char kTemperatureChannel[] = "temperature";  ///< K; NaN in the sky
 inline constexpr char kDriveChannel[] = "drive";              ///< command of a projector's emitter
 inline constexpr char kCountsChannel[] = "counts";            ///< whole numbers of a detector
+inline constexpr char kPhotonsChannel[] = "photons";          ///< s-1 m-2 sr-1 in the band
 inline constexpr char kDepthChannel[] = "depth";    ///< m along the boresight; +Inf in the sky
 inline constexpr char kObjectChannel[] = "object";  ///< object id; 0 in the sky
 /// Share of the pixel that small targets cover, 0..1; optional.

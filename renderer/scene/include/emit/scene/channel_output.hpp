@@ -9,6 +9,9 @@ namespace emit::scene {
 /// Mirror image of a picture: its columns in reverse order, its rows, or both.
 enum class PictureMirror : std::uint8_t { none, horizontal, vertical, both };
 
+/// What the pixels of a channel are, where nothing else makes drive or counts of them.
+enum class PictureQuantity : std::uint8_t { radiance, apparent_temperature, photon_radiance };
+
 /// Shape of the spot that optics make of a point.
 enum class SpotKind : std::uint8_t { none, gaussian, airy, file };
 
@@ -56,6 +59,7 @@ struct ChannelOutput {
   bool apply_shift = false;                       ///< the shift of a motion simulator is applied
   std::filesystem::path nuc_file = {};            ///< EXR with gain and offset; empty: none
   std::filesystem::path drive_table_file = {};    ///< CSV: radiance to drive; empty: none
+  PictureQuantity quantity = PictureQuantity::radiance;
   ChannelOptics optics = {};
   ChannelDetector detector = {};
 

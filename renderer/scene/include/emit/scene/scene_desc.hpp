@@ -30,9 +30,15 @@ struct SpectralBand {
   double lo_um = 0.0;
   double hi_um = 0.0;
   std::vector<ResponseSample> response;  ///< ascending in wavelength, linear in between
+  /// The response is that per photon, as a photon detector has it: radiance is weighted with
+  /// response times wavelength / hi_um.
+  bool photons = false;
 };
-/// Returns a band as the radiometric models take it.
+/// Returns a band as the radiometric models take it. The response of a band that counts photons is
+/// given per power there: its radiance times photons_per_joule() is its photon radiance.
 [[nodiscard]] physics::Band spectral_band(const SpectralBand& desc);
+/// Returns the photons of a joule at the longest wavelength of a band.
+[[nodiscard]] double photons_per_joule(const SpectralBand& desc) noexcept;
 
 /// One layer of a body under its surface.
 struct Layer {
