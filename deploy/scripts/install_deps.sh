@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 # Installs the Debian 12 packages that emitd needs to build, run and pass its tests.
 # Uses sudo when not root. Prints what it installs; installs nothing that is already there.
-# Usage: install_deps.sh [--with-checkers] [--with-yardsticks] [--with-peers]: what checks the source tree and reads its
-# messages in tests; what `emit bench stream` is put beside; other programs that tests put emitd's files and messages
-# before. Packages for Node.js among them go to $EMIT_PEERS_DIR, or to the folder emit/peers of the user's cache. Tests
-# look there, and are skipped where a peer is missing.
+# Usage: install_deps.sh [--with-checkers] [--with-yardsticks] [--with-docs] [--with-peers]: what checks the source tree
+# and reads its messages in tests; what `emit bench stream` is put beside; what builds the documentation site (11 MB);
+# other programs that tests put emitd's files and messages before. Packages for Node.js among them go to
+# $EMIT_PEERS_DIR, or to the folder emit/peers of the user's cache. Tests look there, and are skipped where a peer is
+# missing.
 set -euo pipefail
 
 build_tools=(g++ cmake ninja-build pkg-config git ca-certificates)
@@ -17,6 +18,7 @@ libraries=(libepoxy-dev libegl-dev libglfw3-dev libglm-dev libtinygltf-dev libst
 runtime=(libegl-mesa0 libgl1-mesa-dri xvfb xauth)
 checkers=(clang-format clang-tidy clang libclang-rt-dev python3 tshark chromium python3-websockets)
 yardsticks=(iperf3 libzmq3-dev iceoryx libiceoryx-posh-dev)
+docs=(python3 mkdocs mkdocs-material)
 peers=(gpsd-tools proj-bin ffmpeg)
 node_peers=(@mcap/core@2 @mcap/support@1 protobufjs@7 open-dis@1 gps@0.9)
 peers_folder=${EMIT_PEERS_DIR:-${XDG_CACHE_HOME:-$HOME/.cache}/emit/peers}
@@ -27,6 +29,7 @@ for option in "$@"; do
   case $option in
     --with-checkers) packages+=("${checkers[@]}") ;;
     --with-yardsticks) packages+=("${yardsticks[@]}") ;;
+    --with-docs) packages+=("${docs[@]}") ;;
     --with-peers)
       with_peers=true
       packages+=("${peers[@]}")
@@ -35,7 +38,7 @@ for option in "$@"; do
       command -v npm >/dev/null || packages+=(npm)
       ;;
     *)
-      echo "usage: install_deps.sh [--with-checkers] [--with-yardsticks] [--with-peers]" >&2
+      echo "usage: install_deps.sh [--with-checkers] [--with-yardsticks] [--with-docs] [--with-peers]" >&2
       exit 2
       ;;
   esac
