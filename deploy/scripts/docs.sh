@@ -32,7 +32,9 @@ if ((${#arguments[@]} == 0)); then
     exit 1
   fi
   emit=
-  for folder in ${EMIT_BIN:+"$EMIT_BIN"} build/release/bin build/ci/bin build/dev/bin; do
+  named=${EMIT_BIN:-}
+  unset EMIT_BIN # the program refuses variables of this kind that it does not know
+  for folder in ${named:+"$named"} build/release/bin build/ci/bin build/dev/bin; do
     if [[ -z $emit && -x $folder/emit ]]; then emit=$folder/emit; fi
   done
   arguments=(--out "$out" --emit "$emit")
