@@ -90,8 +90,9 @@ physics::Result<Detector> Detector::make(const scene::ChannelDetector& settings,
     for (std::uint32_t row = 0; row < frame.height_px; ++row) {
       out.first_bad_[row] = static_cast<std::uint32_t>(out.bad_.size());
       for (std::uint32_t column = 0; column < frame.width_px; ++column) {
-        const auto words = philox({column, row, 0, 0},
-                                  {settings.seed, static_cast<std::uint32_t>(NoiseStream::bad_pixels)});
+        const auto words =
+            philox({column, row, 0, 0},
+                   {settings.seed, static_cast<std::uint32_t>(NoiseStream::bad_pixels)});
         if (words[0] < limit) out.bad_.push_back({row, column, (words[1] & 1U) != 0});
       }
     }
@@ -149,8 +150,7 @@ std::uint32_t Detector::apply_line(std::uint32_t row, std::span<float> line) noe
     clamped += counts >= 0.0F && counts < most + 0.5F ? 0 : 1;
     const float kept = counts > 0.0F ? counts : 0.0F;
     // Full scale is at most 2^16 - 1, so that adding a half and cutting rounds exactly.
-    value = static_cast<float>(
-        static_cast<std::int32_t>((kept < most ? kept : most) + 0.5F));
+    value = static_cast<float>(static_cast<std::int32_t>((kept < most ? kept : most) + 0.5F));
   }
   for (const BadPixel& pixel : bad) line[pixel.column] = pixel.hot ? most : 0.0F;
   return clamped;

@@ -12,7 +12,7 @@
 
 namespace emit::server {
 
-/// What a detector makes of radiance: fixed pattern, noise, bad pixels and counts (docs/optics.md
+/// Detector that reads radiance with fixed pattern, noise, bad pixels and counts (docs/optics.md
 /// eq. 5 to 9). Noise depends on the number of the frame alone.
 ///
 /// Thread: one at a time. Real time: begin_frame() and apply_line() are RT-safe.
@@ -37,11 +37,11 @@ class Detector {
   scene::ChannelDetector settings_;
   protocol::ImageSize frame_;
   float reference_w_m2_sr_ = 0.0F;
-  float noise_w_m2_sr_ = 0.0F;   ///< temporal, before the reference
+  float noise_w_m2_sr_ = 0.0F;  ///< temporal, before the reference
   float row_w_m2_sr_ = 0.0F;
   float column_w_m2_sr_ = 0.0F;
-  float hot_w_m2_sr_ = 0.0F;     ///< what a hot pixel reads
-  std::vector<float> gain_;      ///< by row; empty: no fixed pattern
+  float hot_w_m2_sr_ = 0.0F;  ///< what a hot pixel reads
+  std::vector<float> gain_;   ///< by row; empty: no fixed pattern
   std::vector<float> offset_w_m2_sr_;
   /// A pixel that reads the same whatever it sees.
   struct BadPixel {

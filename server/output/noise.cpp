@@ -48,7 +48,8 @@ EMIT_LOOP_BODY float log_of(float u) noexcept {
   const float m = std::bit_cast<float>((shifted & 0x007FFFFFU) + 0x3F3504F3U);
   const float s = (m - 1.0F) / (m + 1.0F);
   const float s2 = s * s;
-  const float series = 1.0F + s2 * (1.0F / 3.0F + s2 * (1.0F / 5.0F + s2 * (1.0F / 7.0F + s2 / 9.0F)));
+  const float series =
+      1.0F + s2 * (1.0F / 3.0F + s2 * (1.0F / 5.0F + s2 * (1.0F / 7.0F + s2 / 9.0F)));
   return e * 0.693147181F + 2.0F * s * series;
 }
 
@@ -59,10 +60,8 @@ EMIT_LOOP_BODY void circle_of(float u, float& sine, float& cosine) noexcept {
   const auto nearest = static_cast<std::int32_t>(quarters + 0.5F);
   const float a = (quarters - static_cast<float>(nearest)) * 1.57079633F;
   const float a2 = a * a;
-  const float s =
-      a * (1.0F + a2 * (-1.0F / 6.0F + a2 * (1.0F / 120.0F + a2 * (-1.0F / 5040.0F))));
-  const float c =
-      1.0F + a2 * (-0.5F + a2 * (1.0F / 24.0F + a2 * (-1.0F / 720.0F + a2 / 40320.0F)));
+  const float s = a * (1.0F + a2 * (-1.0F / 6.0F + a2 * (1.0F / 120.0F + a2 * (-1.0F / 5040.0F))));
+  const float c = 1.0F + a2 * (-0.5F + a2 * (1.0F / 24.0F + a2 * (-1.0F / 720.0F + a2 / 40320.0F)));
   const bool odd = (nearest & 1) != 0;
   const float x = odd ? c : s;
   const float y = odd ? s : c;

@@ -24,7 +24,7 @@ enum class NoiseStream : std::uint32_t {
   column_drift = 6,
 };
 
-/// Where a row of numbers lies.
+/// Place of a row of numbers.
 struct NoisePlace {
   std::uint32_t seed = 1;
   NoiseStream stream = NoiseStream::temporal;

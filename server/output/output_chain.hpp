@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "emit/physics/error.hpp"
 #include "emit/physics/apparent_temperature.hpp"
+#include "emit/physics/error.hpp"
 #include "emit/physics/planck.hpp"
 #include "emit/protocol/output_geometry.hpp"
 #include "emit/scene/scene_desc.hpp"
@@ -32,10 +32,10 @@ class OutputChain {
   struct Origin {
     protocol::ImageSize image;
     scene::PixelRect window_px;
-    double focal_px = 0.0;                   ///< focal length of the image; 0: not known
+    double focal_px = 0.0;                         ///< focal length of the image; 0: not known
     std::optional<scene::SpectralBand> band = {};  ///< of the radiance; empty: not known
   };
-  /// What distinguishes one frame from another.
+  /// Number of a frame, and its shift.
   struct Moment {
     glm::vec2 shift_px{0.0F};  ///< by which the image moves, right and down, with kOutputShifted
     std::uint64_t frame_number = 0;  ///< seed of the noise

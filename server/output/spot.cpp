@@ -120,9 +120,10 @@ Result<Spot> read_spot(const std::filesystem::path& file) {
   if (channel == nullptr) return fail("channel 'spot' is missing");
   if (map->width_px != map->height_px || map->width_px % 2 == 0 ||
       map->width_px > 2 * kMaxSpotRadiusPx + 1) {
-    return fail(fmt::format("a spot has as many columns as rows, an odd number up to {}, but this "
-                            "one has {} x {}",
-                            2 * kMaxSpotRadiusPx + 1, map->width_px, map->height_px));
+    return fail(
+        fmt::format("a spot has as many columns as rows, an odd number up to {}, but this "
+                    "one has {} x {}",
+                    2 * kMaxSpotRadiusPx + 1, map->width_px, map->height_px));
   }
   Spot spot;
   spot.radius_px = map->width_px / 2;

@@ -141,7 +141,8 @@ SpotFilter::SpotFilter(const Spot& spot, const scene::PixelRect& part,
   }
   std::vector<std::size_t> order(n);
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) { return values[a] > values[b]; });
+  std::ranges::stable_sort(order,
+                           [&](std::size_t a, std::size_t b) { return values[a] > values[b]; });
   double left = std::accumulate(values.begin(), values.end(), 0.0);
   const double most = std::ranges::max(spot.share_frac);
   double kept_sum = 0.0;
@@ -247,9 +248,9 @@ std::span<const float> SpotFilter::apply(std::span<const float> image) noexcept 
     }
     for (std::size_t row = 0; row < part_px_.height_px; ++row) {
       for (std::size_t k = 0; k < taps; ++k) rows[k] = across_.data() + (row + k) * width;
-      add_rows(rows.data(), products_[p].down, p != 0,
-               std::span(out_).subspan(
-                   (part_px_.y_px + row) * image_.width_px + part_px_.x_px, width));
+      add_rows(
+          rows.data(), products_[p].down, p != 0,
+          std::span(out_).subspan((part_px_.y_px + row) * image_.width_px + part_px_.x_px, width));
     }
   }
   if (veil_frac_ > 0.0F) add_veil();

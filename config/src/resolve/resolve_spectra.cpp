@@ -267,16 +267,18 @@ void check_quantity(const Node& table, const ChannelDesc& channel,
   };
   if (!output.nuc_file.empty() || !output.drive_table_file.empty() ||
       output.detector.counts_per_w_m2_sr > 0.0) {
-    refuse("'quantity' is radiance where 'nuc_file', 'drive_table_file' or "
-           "'detector.counts_per_w_m2_sr' makes something else of it");
+    refuse(
+        "'quantity' is radiance where 'nuc_file', 'drive_table_file' or "
+        "'detector.counts_per_w_m2_sr' makes something else of it");
   }
   const auto band =
       std::ranges::find_if(bands, [&](const auto& one) { return one.name == channel.band; });
   if (output.quantity == PictureQuantity::photon_radiance && band != bands.end() &&
       !band->photons) {
-    refuse(fmt::format("\"photon_radiance\" needs a [[band]] with photons = true, and '{}' has a "
-                       "response per power",
-                       channel.band));
+    refuse(
+        fmt::format("\"photon_radiance\" needs a [[band]] with photons = true, and '{}' has a "
+                    "response per power",
+                    channel.band));
   }
 }
 

@@ -33,9 +33,9 @@ struct FramePlanes {
   std::uint32_t height_px = 0;
   std::span<const float> radiance_w_m2_sr;
   std::span<const float> temperature_k;
-  std::span<const float> drive;   ///< command of a projector's emitters, in place of radiance
+  std::span<const float> drive;    ///< command of a projector's emitters, in place of radiance
   std::span<const float> photons;  ///< photon radiance, s-1 m-2 sr-1, in place of radiance
-  std::span<const float> counts;  ///< what a detector's converter reads, in place of radiance
+  std::span<const float> counts;   ///< what a detector's converter reads, in place of radiance
   std::span<const float> depth_m;
   std::span<const float> object_id;
   std::span<const float> coverage_frac;
@@ -57,7 +57,7 @@ struct FramePlanes {
   float applied_shift_y_px = 0.0F;
 };
 
-/// Returns the unit of a quantity as files and people write it: "W m-2 sr-1", "K", "drive" 
+/// Returns the unit of a quantity as files and people write it: "W m-2 sr-1", "K", "drive"
 /// "counts" or "photons s-1 m-2 sr-1".
 [[nodiscard]] std::string_view pixel_unit(protocol::PixelQuantity quantity) noexcept;
 /// Returns the plane of a frame that holds a quantity.

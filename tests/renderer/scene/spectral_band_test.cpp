@@ -31,8 +31,9 @@ TEST(SpectralBand, RadianceOfAPhotonBandTimesPhotonsPerJouleIsPhotonRadiance) {
   SpectralBand curved{"curved", 7.5, 11.5, {{7.0, 0.0}, {8.0, 0.9}, {10.0, 1.0}, {11.5, 0.2}}};
   curved.photons = true;
   const auto curve = [](double um) {
-    return um < 8.0 ? 0.9 * (um - 7.0) : um < 10.0 ? 0.9 + 0.05 * (um - 8.0)
-                                                   : 1.0 - 0.8 * (um - 10.0) / 1.5;
+    return um < 8.0    ? 0.9 * (um - 7.0)
+           : um < 10.0 ? 0.9 + 0.05 * (um - 8.0)
+                       : 1.0 - 0.8 * (um - 10.0) / 1.5;
   };
   for (const double kelvin : {230.0, 300.0, 600.0, 2000.0}) {
     const auto of = [&](const SpectralBand& band) {

@@ -78,11 +78,11 @@ TEST(Noise, PlacesAreIndependentAndProcessorsAgree) {
   std::vector<float> begin(77);
   normal_row(place, begin);
   EXPECT_TRUE(std::equal(begin.begin(), begin.end(), row.begin())) << "the length plays no part";
-  for (const NoisePlace& elsewhere : {NoisePlace{2, NoiseStream::temporal, 5, 3},
-                                      NoisePlace{1, NoiseStream::pixel_gain, 5, 3},
-                                      NoisePlace{1, NoiseStream::temporal, 6, 3},
-                                      NoisePlace{1, NoiseStream::temporal, 5 + (1ULL << 32U), 3},
-                                      NoisePlace{1, NoiseStream::temporal, 5, 4}}) {
+  for (const NoisePlace& elsewhere :
+       {NoisePlace{2, NoiseStream::temporal, 5, 3}, NoisePlace{1, NoiseStream::pixel_gain, 5, 3},
+        NoisePlace{1, NoiseStream::temporal, 6, 3},
+        NoisePlace{1, NoiseStream::temporal, 5 + (1ULL << 32U), 3},
+        NoisePlace{1, NoiseStream::temporal, 5, 4}}) {
     normal_row(elsewhere, other);
     double product = 0.0;
     for (std::size_t i = 0; i < row.size(); ++i) {
@@ -102,7 +102,8 @@ TEST(Noise, DriftHasASpectrumOfOneOverF) {
     std::vector<float> course(kFrames);
     for (std::size_t n = 0; n < kFrames; ++n) {
       course[n] = drift_at({3, NoiseStream::row_drift, 1000 + n, row});
-      variance += static_cast<double>(course[n]) * static_cast<double>(course[n]) / (kFrames * kRows);
+      variance +=
+          static_cast<double>(course[n]) * static_cast<double>(course[n]) / (kFrames * kRows);
     }
     for (std::size_t octave = 0; octave < power.size(); ++octave) {
       const std::size_t first = std::size_t{4} << octave;
@@ -153,7 +154,8 @@ TEST(Detector, NoiseHasTheStatedTemperatureDifference) {
       const double expected = std::pow(0.08 * at.derivative_w_m2_sr_k, 2) *
                               (1.0 - photon_frac + photon_frac * static_cast<double>(times));
       EXPECT_NEAR(moments.mean, times * reference, 0.02 * std::sqrt(expected) + 1e-6);
-      EXPECT_NEAR(std::sqrt(moments.variance), std::sqrt(expected), 0.02 * std::sqrt(expected) + 1e-6)
+      EXPECT_NEAR(std::sqrt(moments.variance), std::sqrt(expected),
+                  0.02 * std::sqrt(expected) + 1e-6)
           << photon_frac << ' ' << times;
     }
   }
@@ -186,7 +188,8 @@ TEST(Detector, TheFixedPatternStaysAndHasItsSpread) {
   EXPECT_NEAR(std::sqrt(moments_of(first).variance), 0.4, 0.02 * 0.4);
   Detector offsets = made({.offset_spread_k = 0.5});
   const double expected = 0.5 * at.derivative_w_m2_sr_k;
-  EXPECT_NEAR(std::sqrt(moments_of(frame_of(offsets, 1, 0.0F)).variance), expected, 0.02 * expected);
+  EXPECT_NEAR(std::sqrt(moments_of(frame_of(offsets, 1, 0.0F)).variance), expected,
+              0.02 * expected);
 }
 
 TEST(Detector, RowsAndColumnsDriftTogether) {

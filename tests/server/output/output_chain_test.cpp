@@ -350,7 +350,8 @@ TEST(OutputChain, OpticsAndDetectorComeBeforeCorrectionInTheirOrder) {
   const ImageSize size{64, 48};
   const auto image =
       image_of(size, [](double x, double y) { return 20.0 + std::hypot(x - 20.0, y - 30.0); });
-  const OutputChain::Origin origin{size, {10, 8, 30, 30}, 50.0, scene::SpectralBand{"8-12", 8.0, 12.0, {}}};
+  const OutputChain::Origin origin{
+      size, {10, 8, 30, 30}, 50.0, scene::SpectralBand{"8-12", 8.0, 12.0, {}}};
   scene::ChannelOutput settings;
   settings.optics = {.spot = scene::SpotKind::gaussian, .sigma_px = 1.0};
   auto blurred = OutputChain::make(settings, origin);

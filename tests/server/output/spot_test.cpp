@@ -87,8 +87,8 @@ TEST(Spot, AnObscurationDrawsTheFirstRingInwards) {
   // e = 0.5.
   for (const auto& [obscuration_frac, zero] : {std::pair{0.0, 3.8317}, std::pair{0.5, 3.1444}}) {
     const double airy_px = 4.0;
-    const Spot spot = spot_of(
-        {.spot = SpotKind::airy, .airy_px = airy_px, .obscuration_frac = obscuration_frac});
+    const Spot spot =
+        spot_of({.spot = SpotKind::airy, .airy_px = airy_px, .obscuration_frac = obscuration_frac});
     std::size_t darkest = 1;
     const auto at = [&](std::size_t x) {
       return spot.share_frac[spot.radius_px * spot.side() + spot.radius_px + x];
@@ -158,11 +158,11 @@ TEST(SpotFilter, ProductsOfRowsAndColumnsAreTheConvolution) {
       {.spot = SpotKind::airy, .airy_px = 1.7, .obscuration_frac = 0.4},
       {.spot = SpotKind::file,
        .spot_file = folder.exr("comet.exr", {7, 7}, {{"spot", [](double x, double y) {
-                                                         return x * x / (1.0 + y) + 3.0 * (y > 5);
-                                                       }}})}};
+                                                        return x * x / (1.0 + y) + 3.0 * (y > 5);
+                                                      }}})}};
   for (std::size_t i = 0; i < all.size(); ++i) {
     Spot spot = spot_of(all[i]);
-    // Without the veil the definition is short.
+    // The veil is left out here, so that the definition is short.
     for (double& share : spot.share_frac) share /= 1.0 - spot.veil_frac;
     spot.veil_frac = 0.0;
     SpotFilter filter(spot, {0, 0, size.width_px, size.height_px}, size);
@@ -186,7 +186,7 @@ TEST(SpotFilter, KeepsTheLightOfAPointAndAnEvenImage) {
     point[100 * 220 + 110] = 1000.0F;
     double sum = 0.0;
     for (const float value : filter.apply(point)) sum += static_cast<double>(value);
-      EXPECT_NEAR(sum / 1000.0, 1.0, 1e-5);
+    EXPECT_NEAR(sum / 1000.0, 1.0, 1e-5);
     const std::vector<float> even(point.size(), 37.5F);
     for (const float value : filter.apply(even)) ASSERT_NEAR(value, 37.5F, 37.5F * 2e-6F);
   }
@@ -200,8 +200,8 @@ TEST(SpotFilter, APartOfTheImageIsWhatTheWholeWouldBe) {
   SpotFilter whole(spot, {0, 0, 80, 60}, size);
   const scene::PixelRect part{2, 30, 40, 30};
   SpotFilter some(spot, part, size);
-  EXPECT_EQ(some.reads_px(), (scene::PixelRect{0, 30 - spot.radius_px, 42 + spot.radius_px,
-                                               30 + spot.radius_px}));
+  EXPECT_EQ(some.reads_px(),
+            (scene::PixelRect{0, 30 - spot.radius_px, 42 + spot.radius_px, 30 + spot.radius_px}));
   const auto all = whole.apply(image);
   const auto made = some.apply(image);
   for (std::size_t y = 30; y < 60; ++y) {

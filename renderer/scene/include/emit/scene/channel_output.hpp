@@ -9,7 +9,7 @@ namespace emit::scene {
 /// Mirror image of a picture: its columns in reverse order, its rows, or both.
 enum class PictureMirror : std::uint8_t { none, horizontal, vertical, both };
 
-/// What the pixels of a channel are, where nothing else makes drive or counts of them.
+/// Quantity of a channel's pixels, if nothing else makes drive or counts of them.
 enum class PictureQuantity : std::uint8_t { radiance, apparent_temperature, photon_radiance };
 
 /// Shape of the spot that optics make of a point.
