@@ -257,12 +257,11 @@ physics::Result<void> check_outputs(const scene::ScenarioDesc& scenario) {
 }
 
 TakenPicture take_picture(Picture& picture, const renderer::FrameView& view,
-                          renderer::SlotIndex slot, const glm::vec2& shift_px) noexcept {
+                          renderer::SlotIndex slot, const OutputChain::Moment& moment) noexcept {
   const std::span<const float> plane = view.radiance_w_m2_sr[picture.plane];
   if (picture.chain) {
     std::vector<float>& made = picture.copies[slot];
-    const std::uint32_t clamped_px =
-        picture.chain->apply(plane, {shift_px, view.frame_number}, made);
+    const std::uint32_t clamped_px = picture.chain->apply(plane, moment, made);
     return {made, clamped_px};
   }
   const scene::PixelRect& window = picture.window_px;

@@ -110,13 +110,14 @@ struct ChannelTable {
 /// The pixels of an image, row by row.
 struct TakenPicture {
   std::span<const float> pixels;
-  std::uint32_t clamped_px = 0;  ///< by the drive table of its output
+  std::uint32_t clamped_px = 0;  ///< by its output
 };
 /// Returns the pixels of an image. They lie in the source's memory where they are in one piece
 /// there and nothing is done to them; else they are written to the image's memory for `slot`.
-/// `shift_px` moves the pictures that shift. RT-safe.
+/// `moment` has the shift of the pictures that shift, and the number that noise depends on.
+/// RT-safe.
 [[nodiscard]] TakenPicture take_picture(Picture& picture, const renderer::FrameView& view,
                                         renderer::SlotIndex slot,
-                                        const glm::vec2& shift_px) noexcept;
+                                        const OutputChain::Moment& moment) noexcept;
 
 }  // namespace emit::server

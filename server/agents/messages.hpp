@@ -100,6 +100,7 @@ struct RenderJob {
   /// count on. The render agent chooses the quality level.
   renderer::FrameRequest request;
   std::array<CameraShot, kMaxCameras> shots;  ///< by camera
+  std::uint64_t rendered_number = 0;          ///< of the frame, counting those that are rendered
   std::int64_t deadline_ns = 0;               ///< when the pixels are due; 0: whenever
   ChannelSet channels = kAllChannels;         ///< channels that the frame is for
   // Motion simulator: what the shift of the image follows from.
@@ -140,7 +141,7 @@ struct Image {
   ChannelSet channels = kAllChannels;  ///< channels that show it; others have no image
   std::array<std::span<const float>, kMaxPictures> pictures;
   std::array<std::uint32_t, kMaxPictures> crc32c{};
-  std::array<std::uint32_t, kMaxPictures> clamped_px{};  ///< by the drive tables of the outputs
+  std::array<std::uint32_t, kMaxPictures> clamped_px{};  ///< by the outputs
   /// Shift by which the pictures that shift were moved, right and down in the sensor's image.
   glm::vec2 shift_px{0.0F};
 

@@ -69,6 +69,7 @@ physics::Result<std::optional<ReplayedFrame>> JournalPlayer::apply(const v1::Jou
     weather_.clear();
     parts_.clear();
     render_number_ = 0;
+    rendered_number_ = 0;
     run_id_ = entry.run_start().run_id();
     started_ = true;
     return std::optional<ReplayedFrame>();
@@ -139,8 +140,10 @@ physics::Result<void> JournalPlayer::play_shot(const v1::FrameDecision& decision
   }
   const Channel& channel = channels_.channels[shot.radiance_channel()];
   const glm::vec2 shift_px(decision.applied_shift_x_px(), decision.applied_shift_y_px());
-  const std::uint32_t crc = protocol::crc32c(std::as_bytes(
-      take_picture(channels_.pictures[channel.picture], view, shown_.back(), shift_px).pixels));
+  const std::uint32_t crc =
+      protocol::crc32c(std::as_bytes(take_picture(channels_.pictures[channel.picture], view,
+                                                  shown_.back(), {shift_px, rendered_number_})
+                                         .pixels));
   crcs_match_ = crcs_match_ && crc == shot.radiance_crc32c();
   if (shown_.size() == 1) {
     view_ = &view;
@@ -191,6 +194,7 @@ physics::Result<std::optional<ReplayedFrame>> JournalPlayer::play(const v1::Fram
     source_.apply_entities(decision.sim_time_ns(), updates);
 
     crcs_match_ = true;
+    ++rendered_number_;
     if (auto played = play_shot(decision, decision, sequence); !played) {
       return tl::unexpected<physics::Error>(std::move(played.error()));
     }

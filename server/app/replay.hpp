@@ -83,7 +83,8 @@ class JournalPlayer {
   std::uint32_t view_crc_ = 0;
   std::vector<PendingWeather> weather_;  ///< accepted, but not used by a frame yet
   std::vector<PendingPart> parts_;       ///< likewise
-  std::uint64_t render_number_ = 0;
+  std::uint64_t render_number_ = 0;      // of the latest image
+  std::uint64_t rendered_number_ = 0;    // of its frame
   std::uint64_t frames_ = 0;
   std::uint64_t mismatches_ = 0;
 };

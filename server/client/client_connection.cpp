@@ -73,6 +73,7 @@ ChannelDescription describe_channel(const v1::ChannelInfo& info) {
   out.window_width_px = info.window_width_px() > 0 ? info.window_width_px() : info.width_px();
   out.window_height_px = info.window_height_px() > 0 ? info.window_height_px() : info.height_px();
   out.output_steps = static_cast<std::uint16_t>(info.output_steps());
+  if (info.quantity() != 0) out.quantity = static_cast<protocol::PixelQuantity>(info.quantity());
   if (info.band_is_rectangle()) {
     out.response.emplace();
   } else if (info.response_um_size() > 0 && info.response_um_size() == info.response_frac_size()) {

@@ -13,9 +13,6 @@
 namespace emit::server {
 namespace {
 
-/// Radiance of a hot pixel where the detector has no converter, in radiances of the reference.
-constexpr double kHotReferences = 10.0;
-
 /// Adds temporal noise to a row: its variance is that of the reference, of which a share grows with
 /// radiance.
 struct Noise {
@@ -46,16 +43,24 @@ physics::Result<Detector> Detector::make(const scene::ChannelDetector& settings,
   Detector out;
   out.settings_ = settings;
   out.frame_ = frame;
+  if (settings.bad_px_frac > 0.0 && !(settings.counts_per_w_m2_sr > 0.0)) {
+    return physics::make_error(
+        physics::ErrorCode::config,
+        "detector.bad_px_frac needs detector.counts_per_w_m2_sr: a hot pixel "
+        "reads full scale");
+  }
   const bool in_kelvin = settings.netd_k > 0.0 || settings.row_noise_k > 0.0 ||
                          settings.column_noise_k > 0.0 || settings.offset_spread_k > 0.0;
   physics::BandRadiance reference;
   if (band) reference = physics::band_radiance(*band, physics::Kelvin(settings.reference_k));
-  if (in_kelvin && !(reference.derivative_w_m2_sr_k > 0.0)) {
+  if (in_kelvin && !(std::isnormal(static_cast<float>(reference.derivative_w_m2_sr_k)) &&
+                     std::isnormal(static_cast<float>(reference.radiance_w_m2_sr)))) {
     return physics::make_error(
         physics::ErrorCode::config,
-        band ? fmt::format("detector.reference_k is {}: a blackbody of it has no radiance in the "
-                           "band, so noise in kelvin is not defined",
-                           settings.reference_k)
+        band ? fmt::format(
+                   "detector.reference_k is {}: a blackbody of it has next to no radiance in the "
+                   "band, so noise in kelvin is not defined",
+                   settings.reference_k)
              : "detector noise in kelvin needs the band of a scenario");
   }
   const auto to_radiance = [&](double kelvin) {
@@ -65,7 +70,6 @@ physics::Result<Detector> Detector::make(const scene::ChannelDetector& settings,
   out.noise_w_m2_sr_ = to_radiance(settings.netd_k);
   out.row_w_m2_sr_ = to_radiance(settings.row_noise_k);
   out.column_w_m2_sr_ = to_radiance(settings.column_noise_k);
-  out.hot_w_m2_sr_ = static_cast<float>(kHotReferences * reference.radiance_w_m2_sr);
   // Draw the fixed pattern.
   const std::size_t width = frame.width_px;
   const std::size_t pixels = width * frame.height_px;
@@ -137,17 +141,14 @@ std::uint32_t Detector::apply_line(std::uint32_t row, std::span<float> line) noe
   }
   const auto bad = std::span(bad_).subspan(first_bad_[row], first_bad_[row + 1] - first_bad_[row]);
   // Convert to counts.
-  if (!(settings_.counts_per_w_m2_sr > 0.0)) {
-    for (const BadPixel& pixel : bad) line[pixel.column] = pixel.hot ? hot_w_m2_sr_ : 0.0F;
-    return 0;
-  }
+  if (!(settings_.counts_per_w_m2_sr > 0.0)) return 0;
   const auto scale = static_cast<float>(settings_.counts_per_w_m2_sr);
   const auto offset = static_cast<float>(settings_.counts_offset);
   const auto most = static_cast<float>((std::uint32_t{1} << settings_.counts_bits) - 1);
   std::uint32_t clamped = 0;
   for (float& value : line) {
     const float counts = offset + scale * value;
-    clamped += counts >= 0.0F && counts < most + 0.5F ? 0 : 1;
+    clamped += counts >= -0.5F && counts < most + 0.5F ? 0 : 1;
     const float kept = counts > 0.0F ? counts : 0.0F;
     // Full scale is at most 2^16 - 1, so that adding a half and cutting rounds exactly.
     value = static_cast<float>(static_cast<std::int32_t>((kept < most ? kept : most) + 0.5F));

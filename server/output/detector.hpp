@@ -20,7 +20,8 @@ class Detector {
  public:
   /// Makes the fixed pattern. Setup only.
   /// Errors: config, when noise is stated in kelvin and the channel has no band, or when a
-  /// blackbody of the reference temperature has no radiance in it.
+  /// blackbody of the reference temperature has next to no radiance in it; when there are bad
+  /// pixels and no counts.
   [[nodiscard]] static physics::Result<Detector> make(const scene::ChannelDetector& settings,
                                                       const std::optional<physics::Band>& band,
                                                       const protocol::ImageSize& frame);
@@ -40,8 +41,7 @@ class Detector {
   float noise_w_m2_sr_ = 0.0F;  ///< temporal, before the reference
   float row_w_m2_sr_ = 0.0F;
   float column_w_m2_sr_ = 0.0F;
-  float hot_w_m2_sr_ = 0.0F;  ///< what a hot pixel reads
-  std::vector<float> gain_;   ///< by row; empty: no fixed pattern
+  std::vector<float> gain_;  ///< by row; empty: no fixed pattern
   std::vector<float> offset_w_m2_sr_;
   /// A pixel that reads the same whatever it sees.
   struct BadPixel {

@@ -13,7 +13,9 @@ namespace {
 
 /// Counters that are worked on side by side.
 constexpr std::size_t kLanes = 16;
-using Words = std::array<std::uint32_t, kLanes>;
+/// One word of some counters.
+template <std::size_t lanes>
+using Words = std::array<std::uint32_t, lanes>;
 
 constexpr std::uint32_t kMultiply0 = 0xD2511F53U;
 constexpr std::uint32_t kMultiply1 = 0xCD9E8D57U;
@@ -21,10 +23,11 @@ constexpr std::uint32_t kBump0 = 0x9E3779B9U;
 constexpr std::uint32_t kBump1 = 0xBB67AE85U;
 constexpr int kRounds = 10;
 
-EMIT_LOOP_BODY void philox_lanes(std::array<Words, 4>& counter, std::uint32_t key0,
+template <std::size_t lanes>
+EMIT_LOOP_BODY void philox_lanes(std::array<Words<lanes>, 4>& counter, std::uint32_t key0,
                                  std::uint32_t key1) noexcept {
   for (int round = 0; round < kRounds; ++round) {
-    for (std::size_t l = 0; l < kLanes; ++l) {
+    for (std::size_t l = 0; l < lanes; ++l) {
       const std::uint64_t product0 = std::uint64_t{kMultiply0} * counter[0][l];
       const std::uint64_t product1 = std::uint64_t{kMultiply1} * counter[2][l];
       const auto high0 = static_cast<std::uint32_t>(product0 >> 32U);
@@ -78,7 +81,7 @@ constexpr std::size_t kPerBlock = 4 * kLanes;
 
 EMIT_LOOP_BODY void normal_block(const NoisePlace& place, std::uint32_t block,
                                  std::array<float, kPerBlock>& out) noexcept {
-  std::array<Words, 4> words;
+  std::array<Words<kLanes>, 4> words;
   for (std::size_t l = 0; l < kLanes; ++l) {
     words[0][l] = static_cast<std::uint32_t>(block * kLanes + l);
     words[1][l] = place.row;
@@ -121,7 +124,7 @@ EMIT_WIDE_TARGET void normal_row_wide(const NoisePlace& place, std::span<float> 
 
 std::array<std::uint32_t, 4> philox(std::array<std::uint32_t, 4> counter,
                                     std::array<std::uint32_t, 2> key) noexcept {
-  std::array<Words, 4> words{};
+  std::array<Words<1>, 4> words{};
   for (std::size_t i = 0; i < 4; ++i) words[i][0] = counter[i];
   philox_lanes(words, key[0], key[1]);
   return {words[0][0], words[1][0], words[2][0], words[3][0]};

@@ -85,20 +85,19 @@ Result<PositionMap::Source> positions_of(const scene::ChannelOutput& settings,
 }
 
 /// Returns the share of the irradiance on the axis that each pixel of a frame gets: the fourth
-/// power of the cosine of its angle. The distortion plays no part.
-std::vector<float> vignetting_of(std::uint16_t steps, const ImageSize& frame,
+/// power of the cosine of the angle of what it shows. `source` has the place of that in the turned
+/// picture. Pixels that show nothing keep all.
+std::vector<float> vignetting_of(std::uint16_t steps, const PositionMap::Source& source,
                                  const OutputChain::Origin& origin) {
   const ImageSize window{origin.window_px.width_px, origin.window_px.height_px};
   std::vector<float> out;
-  out.reserve(std::size_t{frame.width_px} * frame.height_px);
-  for (std::uint32_t row = 0; row < frame.height_px; ++row) {
-    for (std::uint32_t column = 0; column < frame.width_px; ++column) {
-      const ImagePoint at = protocol::window_point(steps, window, {column + 0.5, row + 0.5});
-      const double x = origin.window_px.x_px + at.x_px - 0.5 * origin.image.width_px;
-      const double y = origin.window_px.y_px + at.y_px - 0.5 * origin.image.height_px;
-      const double cos2 = 1.0 / (1.0 + (x * x + y * y) / (origin.focal_px * origin.focal_px));
-      out.push_back(static_cast<float>(cos2 * cos2));
-    }
+  out.reserve(source.points.size());
+  for (const ImagePoint& point : source.points) {
+    const ImagePoint at = protocol::window_point(steps, window, point);
+    const double x = origin.window_px.x_px + at.x_px - 0.5 * origin.image.width_px;
+    const double y = origin.window_px.y_px + at.y_px - 0.5 * origin.image.height_px;
+    const double cos2 = 1.0 / (1.0 + (x * x + y * y) / (origin.focal_px * origin.focal_px));
+    out.push_back(std::isfinite(cos2) ? static_cast<float>(cos2 * cos2) : 1.0F);
   }
   return out;
 }
@@ -149,7 +148,10 @@ Result<OutputChain> OutputChain::make(const scene::ChannelOutput& settings, cons
     if (!(origin.focal_px > 0.0)) {
       return make_error(ErrorCode::config, "vignetting needs the sensor's field of view");
     }
-    out.vignetting_frac_ = vignetting_of(out.steps_, out.frame_, origin);
+    const auto source =
+        positions_of(settings, protocol::turned_size(out.steps_, window), origin.focal_px);
+    if (!source) return tl::unexpected(source.error());
+    out.vignetting_frac_ = vignetting_of(out.steps_, *source, origin);
   }
   if ((out.steps_ & (protocol::kOutputDetected | protocol::kOutputCounted)) != 0) {
     std::optional<physics::Band> band;

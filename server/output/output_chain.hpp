@@ -38,7 +38,7 @@ class OutputChain {
   /// Number of a frame, and its shift.
   struct Moment {
     glm::vec2 shift_px{0.0F};  ///< by which the image moves, right and down, with kOutputShifted
-    std::uint64_t frame_number = 0;  ///< seed of the noise
+    std::uint64_t frame_number = 0;  ///< noise depends on it, beside its seed
   };
   /// Room around the window from which samples of the image are taken, with a shift and without. A
   /// channel whose picture moves shows the scene at its borders, as far as the image reaches.

@@ -21,6 +21,8 @@ namespace {
 
 /// A Gaussian is cut where 1e-5 of its light lies beyond.
 constexpr double kGaussianReach = 4.5;
+/// Most light that may lie beyond the pixels with a share of their own.
+constexpr double kMostVeilFrac = 0.1;
 /// An Airy pattern has shares of its own up to this many times wavelength times f-number. Some
 /// hundredths of its light lie beyond, in the veil.
 constexpr double kAiryReach = 12.0;
@@ -149,8 +151,16 @@ Result<Spot> make_spot(const scene::ChannelOptics& settings) {
   switch (settings.spot) {
     case scene::SpotKind::gaussian:
       return gaussian_spot(settings.sigma_px);
-    case scene::SpotKind::airy:
-      return airy_spot(settings.airy_px, settings.obscuration_frac);
+    case scene::SpotKind::airy: {
+      Spot spot = airy_spot(settings.airy_px, settings.obscuration_frac);
+      if (spot.veil_frac <= kMostVeilFrac) return spot;
+      return make_error(
+          ErrorCode::config,
+          fmt::format("optics.airy_px = {} with obscuration_frac = {}: {:.0f} % of the light lies "
+                      "beyond {} px, at most {:.0f} % can be drawn as an even veil",
+                      settings.airy_px, settings.obscuration_frac, 100.0 * spot.veil_frac,
+                      spot.radius_px, 100.0 * kMostVeilFrac));
+    }
     default:
       return read_spot(settings.spot_file);
   }

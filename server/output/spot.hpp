@@ -26,7 +26,8 @@ struct Spot {
 /// pixel, or the shares of a file, scaled to 1. Setup only.
 /// Errors: those of image::read_exr(); config, when a file lacks the channel `spot`, has no odd
 /// size up to 2 kMaxSpotRadiusPx + 1 or the same height as width, or holds a value that is negative
-/// or no number, or nothing but 0.
+/// or no number, or nothing but 0; when more than a tenth of the light of an Airy pattern lies
+/// beyond the greatest radius.
 /// @pre settings.spot is not SpotKind::none
 [[nodiscard]] physics::Result<Spot> make_spot(const scene::ChannelOptics& settings);
 

@@ -94,7 +94,7 @@ namespace emit::server {
   X(axes_torn_reads, "looks at its memory while it wrote: read again later")               \
   X(axes_reports_dropped, "measurements the conductor did not take in time")               \
   X(shift_feedback_dropped, "measurements the render agent did not take in time")          \
-  X(output_px_clamped, "pixels beyond the ends of a channel's drive table")                \
+  X(output_px_clamped, "pixels outside the range of a channel's drive, counts or kelvin")  \
   X(output_shifts_unknown, "frames not shifted: no measurement of the axes was near")      \
   X(axes_feedback_losses, "times its measurements stopped: motion.feedback_timeout_ms")    \
   X(axes_host_silences, "times no pose came for pacing.horizon_ms: its axes rest or park") \

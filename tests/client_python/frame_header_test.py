@@ -82,7 +82,7 @@ class FrameHeaderBytes(unittest.TestCase):
                           (frame_header(header_bytes=319), "size field 319"),
                           (good[:100] + b"\x01" + good[101:], "CRC"),
                           (frame_header(pixel_format=2), "unknown pixel format 2"),
-                          (frame_header(quantity=4), "unknown pixel quantity 4"),
+                          (frame_header(quantity=6), "unknown pixel quantity 6"),
                           (frame_header(encoding=2), "unknown pixel encoding 2"),
                           (frame_header(payload_bytes=8), "8 payload bytes for 1x1"),
                           (frame_header(sensor_width_px=4, sensor_height_px=4, window_x_px=4), "of a sensor of 4x4")):

@@ -191,7 +191,7 @@ TEST(FrameHeader, SaysWhatWasDoneToThePixels) {
   EXPECT_EQ(back->output_steps, header.output_steps);
   EXPECT_EQ(back->applied_shift_x_px, 1.5F);
   EXPECT_EQ(back->applied_shift_y_px, -0.25F);
-  EXPECT_THAT(error_of(forged(6, 4)), HasSubstr("pixel quantity 4"));
+  EXPECT_THAT(error_of(forged(6, 6)), HasSubstr("pixel quantity 6"));
 }
 
 }  // namespace

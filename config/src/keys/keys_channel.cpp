@@ -131,9 +131,8 @@ void add_quantity_key(KeyTable<ChannelDesc>& keys) {
               {"apparent_temperature", PictureQuantity::apparent_temperature},
               {"photon_radiance", PictureQuantity::photon_radiance}},
           EMIT_FIELD(output.quantity),
-          "What pixels are: radiance in the band (W m-2 sr-1), the temperature of a blackbody of "
-          "that radiance (K, 150 to 3000), or photons (s-1 m-2 sr-1), which needs a `[[band]]` "
-          "with `photons = true`.")));
+          "Unit of the pixels: W m-2 sr-1, K (150 to 3000) or photons s-1 m-2 sr-1. Photons need a "
+          "`[[band]]` with `photons = true`.")));
 }
 
 /// Adds the tables of the optics and the detector.

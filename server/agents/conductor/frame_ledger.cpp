@@ -15,6 +15,7 @@ std::uint64_t FrameLedger::begin_run(std::int64_t now_ns) noexcept {
   run_id_ = std::max(run_id_ + 1, static_cast<std::uint64_t>(std::max<std::int64_t>(now_ns, 0)));
   frame_number_ = 0;
   render_number_ = 0;
+  rendered_number_ = 0;
   shown_ = {};
   return run_id_;
 }
@@ -31,6 +32,7 @@ FrameLedger::Issued& FrameLedger::next() noexcept {
 void FrameLedger::issue(RenderJob& job, Issued& issued) noexcept {
   EMIT_DCHECK(!full());
   job.request.frame_number = render_number_ + 1;
+  job.rendered_number = ++rendered_number_;
   render_number_ += static_cast<std::uint64_t>(
       std::ranges::count_if(job.shots, [](const CameraShot& shot) { return shot.due; }));
   job.deadline_ns = issued.header.deadline_ns;

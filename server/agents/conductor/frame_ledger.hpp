@@ -88,9 +88,10 @@ class FrameLedger {
 
   Context& context_;
   std::uint64_t run_id_ = 0;
-  std::uint64_t frame_number_ = 0;   // of the newest frame published
-  std::uint64_t render_number_ = 0;  // of the newest frame issued
-  std::vector<Issued> issued_;       // ring of kMaxInWork
+  std::uint64_t frame_number_ = 0;     // of the newest frame published
+  std::uint64_t rendered_number_ = 0;  // of the newest frame issued; repeated ones do not count
+  std::uint64_t render_number_ = 0;    // of its last image
+  std::vector<Issued> issued_;         // ring of kMaxInWork
   std::size_t first_ = 0;
   std::size_t in_work_ = 0;
   protocol::FrameHeader shown_;

@@ -26,6 +26,7 @@ void fill(const Channel& channel, v1::ChannelInfo& out) {
   out.set_window_width_px(channel.window_px.width_px);
   out.set_window_height_px(channel.window_px.height_px);
   out.set_output_steps(channel.output_steps);
+  out.set_quantity(static_cast<std::uint32_t>(channel.quantity));
   out.set_sensor_width_px(channel.sensor_width_px);
   out.set_sensor_height_px(channel.sensor_height_px);
 }

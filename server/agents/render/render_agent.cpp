@@ -88,6 +88,7 @@ bool RenderAgent::take_job() noexcept {
         next.attitude = job->attitude;
         next.display_ns = job->display_ns;
         next.channels = job->channels;
+        next.rendered_number = job->rendered_number;
         job_prepared_ = true;
       }
       if (!submit_shots(*job)) {
@@ -320,7 +321,7 @@ void RenderAgent::finish_shot(InFlight& frame, std::size_t camera, RenderDone& d
   if (frame.collected == 0) {
     find_shift(frame, done);
   }
-  take_pictures(camera, view, image.slot, done.image);
+  take_pictures(frame, camera, view, image.slot, done.image);
 }
 
 void RenderAgent::take_feedback() noexcept {
@@ -343,14 +344,16 @@ void RenderAgent::find_shift(const InFlight& frame, RenderDone& done) noexcept {
   context_.counters.add(Counter::output_shifts_unknown);
 }
 
-void RenderAgent::take_pictures(std::size_t camera, const renderer::FrameView& view,
-                                renderer::SlotIndex slot, Image& image) noexcept {
+void RenderAgent::take_pictures(const InFlight& frame, std::size_t camera,
+                                const renderer::FrameView& view, renderer::SlotIndex slot,
+                                Image& image) noexcept {
   const std::span<Picture> pictures(context_.pictures);
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     if (pictures[i].camera != camera || (pictures[i].channels & image.channels) == 0) {
       continue;
     }
-    const TakenPicture taken = take_picture(pictures[i], view, slot, image.shift_px);
+    const TakenPicture taken =
+        take_picture(pictures[i], view, slot, {image.shift_px, frame.rendered_number});
     image.pictures[i] = taken.pixels;
     image.clamped_px[i] = taken.clamped_px;
     context_.counters.add(Counter::output_px_clamped, taken.clamped_px);

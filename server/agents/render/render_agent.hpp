@@ -55,6 +55,7 @@ class RenderAgent final : public Agent {
     double expected_ms = 0.0;   ///< time of its quality level, by the ladder
     std::int64_t begun_ns = 0;  ///< monotonic; render_start_ns is TAI
     ChannelSet channels = 0;
+    std::uint64_t rendered_number = 0;
     bool warmed_up = false;  ///< the surface warmed up again in its submit()
   };
   /// Number of frames in flight. With more than one, upload of the next overlaps with read-back of
@@ -83,8 +84,8 @@ class RenderAgent final : public Agent {
   /// Finds the shift of the frame by the newest measurements, where pictures shift.
   void find_shift(const InFlight& frame, RenderDone& done) noexcept;
   /// Takes the pictures of one camera that image.channels show, and their checksums.
-  void take_pictures(std::size_t camera, const renderer::FrameView& view, renderer::SlotIndex slot,
-                     Image& image) noexcept;
+  void take_pictures(const InFlight& frame, std::size_t camera, const renderer::FrameView& view,
+                     renderer::SlotIndex slot, Image& image) noexcept;
   /// Chooses the quality level of a frame of so many images, by the first one.
   [[nodiscard]] std::uint8_t choose_quality_level(const RenderJob& job,
                                                   const renderer::FrameRequest& first,

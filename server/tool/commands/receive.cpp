@@ -198,9 +198,8 @@ void Reception::greet() const {
   const client::FrameClient& client = stream_.client();
   fmt::print(stderr, "emit: {} ({}), scenario {}, {}\n", client.server().software,
              client.server().device, client.server().scenario, channel_text(stream_.channel()));
-  constexpr std::uint16_t kNoRadiance =
-      protocol::kOutputCorrected | protocol::kOutputDriven | protocol::kOutputCounted;
-  const bool radiance = (stream_.channel().output_steps & kNoRadiance) == 0;
+  constexpr auto kRadiance = protocol::PixelQuantity::radiance_w_m2_sr;
+  const bool radiance = stream_.channel().quantity.value_or(kRadiance) == kRadiance;
   if (const auto band = stream_.channel().spectral_band(); band && command_.out && radiance) {
     fmt::print(stderr, "emit: colours show apparent temperature, {}\n",
                conversion_text(*band, stream_.channel().response.has_value()));

@@ -245,7 +245,8 @@ physics::Result<void> Rendering::write_pictures(double time_s, std::size_t band,
 Json Rendering::show_output(const renderer::FrameView& view, FramePlanes& planes) {
   server::Picture& picture = plan_.output->pictures.front();
   const server::Channel& channel = plan_.output->channels.front();
-  const server::TakenPicture taken = server::take_picture(picture, view, 0, glm::vec2(0.0F));
+  const server::TakenPicture taken =
+      server::take_picture(picture, view, 0, {{}, view.frame_number});
   const protocol::PixelQuantity quantity = channel.quantity;
   planes.width_px = channel.width_px;
   planes.height_px = channel.height_px;

@@ -175,7 +175,7 @@ std::string Viewer::cursor_text() const {
       static_cast<std::size_t>(at->y_px) * frame_.width_px + static_cast<std::size_t>(at->x_px);
   std::string text =
       fmt::format("{} {}  {:.4g} {}", at->x_px, at->y_px, frame_.radiance_w_m2_sr[index],
-                  frame_.drive ? "DRIVE" : "W/M2/SR");
+                  frame_.unit.empty() ? std::string_view("W/M2/SR") : frame_.unit);
   if (!frame_.temperature_k.empty()) {
     const float kelvin = frame_.temperature_k[index];
     text += std::isnan(kelvin) ? "  SKY"
@@ -190,7 +190,7 @@ void Viewer::draw(image::RgbImage* read_back) {
   options.min_value = limits().low;
   options.max_value = limits().high;
   options.color_bar = true;
-  options.unit = frame_.drive ? "" : show_radiance_ ? "W" : "K";
+  options.unit = !frame_.unit.empty() ? "" : show_radiance_ ? "W" : "K";
   auto picture = image::false_color(values(), frame_.width_px, frame_.height_px, options);
   if (!picture) return;
   const std::string cursor = cursor_text();

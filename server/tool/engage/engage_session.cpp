@@ -250,11 +250,16 @@ Result<void> EngageSession::keep_film(const client::ReceivedFrame& shown, const 
   FramePlanes planes;
   planes.width_px = shown.header.width_px;
   planes.height_px = shown.header.height_px;
-  planes.radiance_w_m2_sr = shown.pixels;
+  plane_of(planes, shown.header.quantity) = shown.pixels;
   planes.apparent = apparent_ ? &*apparent_ : nullptr;
-  planes.metadata = {
-      shown.header.sim_time_ns, shown.header.frame_number, shown.header.pose, channel_.band,
-      channel_.band_lo_um,      channel_.band_hi_um,       "W m-2 sr-1",      channel_.response};
+  planes.metadata = {shown.header.sim_time_ns,
+                     shown.header.frame_number,
+                     shown.header.pose,
+                     channel_.band,
+                     channel_.band_lo_um,
+                     channel_.band_hi_um,
+                     std::string(pixel_unit(shown.header.quantity)),
+                     channel_.response};
   if (auto done = write_frame_png(options_.out / picture.file, planes,
                                   {scenario_.display.min_k, scenario_.display.max_k});
       !done) {

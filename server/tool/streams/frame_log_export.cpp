@@ -84,6 +84,9 @@ Result<void> write_image(const std::filesystem::path& folder, const v1::Recorded
   plane_of(planes, header->quantity) = pixels;
   planes.window_px = {header->window_x_px, header->window_y_px, header->width_px,
                       header->height_px};
+  planes.output_steps = header->output_steps;
+  planes.applied_shift_x_px = header->applied_shift_x_px;
+  planes.applied_shift_y_px = header->applied_shift_y_px;
   planes.sensor_width_px = header->sensor_width_px;
   planes.sensor_height_px = header->sensor_height_px;
   std::vector<physics::ResponsePoint> response;

@@ -6,6 +6,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "emit/client/security.hpp"
@@ -37,7 +38,7 @@ struct ViewFrame {
   std::vector<float> radiance_w_m2_sr;
   std::vector<float> temperature_k;  ///< of the surface, or apparent; see apparent_temperature
   bool apparent_temperature = false;
-  bool drive = false;  ///< the radiance is the drive of a projector's emitters instead
+  std::string_view unit;  ///< of the radiance, where it is another quantity; empty: W m-2 sr-1
   std::uint64_t frame_number = 0;
   std::int64_t sim_time_ns = 0;
   std::uint32_t flags = 0;

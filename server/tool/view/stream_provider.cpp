@@ -18,7 +18,9 @@ class StreamProvider final : public FrameProvider {
   StreamProvider(std::unique_ptr<client::FrameClient> client, client::ChannelDescription channel)
       : client_(std::move(client)), channel_(std::move(channel)) {
     // Canned streams may name no band. They have a radiance alone.
-    if (const auto band = channel_.spectral_band()) {
+    constexpr auto kRadiance = protocol::PixelQuantity::radiance_w_m2_sr;
+    const bool radiance = channel_.quantity.value_or(kRadiance) == kRadiance;
+    if (const auto band = channel_.spectral_band(); band && radiance) {
       apparent_.emplace(*band);
       fmt::print(stderr, "emit: apparent temperature, {}\n",
                  conversion_text(*band, channel_.response.has_value()));
@@ -58,8 +60,9 @@ class StreamProvider final : public FrameProvider {
       frame.width_px = header.width_px;
       frame.height_px = header.height_px;
       frame.radiance_w_m2_sr.assign(pixels.begin(), pixels.end());
-      frame.drive = header.quantity != protocol::PixelQuantity::radiance_w_m2_sr;
-      if (apparent_ && !frame.drive) frame.temperature_k = apparent_->kelvin(pixels);
+      const bool radiance = header.quantity == protocol::PixelQuantity::radiance_w_m2_sr;
+      frame.unit = radiance ? std::string_view() : pixel_unit(header.quantity);
+      if (apparent_ && radiance) frame.temperature_k = apparent_->kelvin(pixels);
       frame.apparent_temperature = true;
       frame.frame_number = header.frame_number;
       frame.sim_time_ns = header.sim_time_ns;

@@ -35,6 +35,9 @@ TEST(SpectralBand, RadianceOfAPhotonBandTimesPhotonsPerJouleIsPhotonRadiance) {
            : um < 10.0 ? 0.9 + 0.05 * (um - 8.0)
                        : 1.0 - 0.8 * (um - 10.0) / 1.5;
   };
+  // This one ends with full response within its limits, on both sides.
+  SpectralBand inside{"inside", 3.0, 5.5, {{3.4, 1.0}, {5.0, 1.0}}};
+  inside.photons = true;
   for (const double kelvin : {230.0, 300.0, 600.0, 2000.0}) {
     const auto of = [&](const SpectralBand& band) {
       return photons_per_joule(band) *
@@ -42,9 +45,11 @@ TEST(SpectralBand, RadianceOfAPhotonBandTimesPhotonsPerJouleIsPhotonRadiance) {
     };
     const double expected = photon_radiance(3.0, 5.0, kelvin, [](double) { return 1.0; });
     EXPECT_NEAR(of(flat) / expected, 1.0, 1e-6) << kelvin;
-    EXPECT_NEAR(of(curved) / photon_radiance(7.5, 11.5, kelvin, curve), 1.0, 3e-4) << kelvin;
+    EXPECT_NEAR(of(curved) / photon_radiance(7.5, 11.5, kelvin, curve), 1.0, 5e-5) << kelvin;
+    const double within = photon_radiance(3.4, 5.0, kelvin, [](double) { return 1.0; });
+    EXPECT_NEAR(of(inside) / within, 1.0, 1e-6) << kelvin;
   }
-  for (const SpectralBand& band : {flat, curved}) {
+  for (const SpectralBand& band : {flat, curved, inside}) {
     EXPECT_TRUE(physics::validate(spectral_band(band)).has_value());
   }
 }

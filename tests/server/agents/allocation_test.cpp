@@ -48,8 +48,7 @@ TEST(SteadyState, NoAgentOnTheFramePathAllocates) {
                      .photon_frac = 0.5,
                      .row_noise_k = 0.1,
                      .column_noise_k = 0.1,
-                     .gain_spread_frac = 0.01,
-                     .bad_px_frac = 0.01};
+                     .gain_spread_frac = 0.01};
   scenario.sensor.fov_h_rad = 0.2;
   scenario.sensor.width_px = 64;
   scenario.sensor.height_px = 48;

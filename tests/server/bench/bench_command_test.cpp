@@ -182,10 +182,10 @@ TEST(CliBench, OutputMeasuresEveryStepBesideACopy) {
   const std::string json = read_text(folder.file("o.json"));
   EXPECT_EQ(json_value(json, "suite"), "\"output\"");
   const auto ratios = numbers_of(json, "ratio_to_copy");
-  ASSERT_EQ(ratios.size(), 10U);
+  ASSERT_EQ(ratios.size(), 15U);
   EXPECT_EQ(ratios[0], 1.0) << "the copy";
   for (const double ratio : ratios) EXPECT_GT(ratio, 0.0);
-  EXPECT_EQ(numbers_of(json, "median_ms").size(), 10U);
+  EXPECT_EQ(numbers_of(json, "median_ms").size(), 15U);
 }
 
 TEST(CliBench, IsolationComparesPairsOfRunsBesideARunAgainstItself) {

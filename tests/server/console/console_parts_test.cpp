@@ -220,7 +220,7 @@ TEST(ConsoleState, SendsTheTemperatureTableOfTheProduct) {
   const image::TemperatureTable table(3.0, 5.0);
   ASSERT_EQ(bytes.size(), table.radiances_w_m2_sr().size_bytes());
   EXPECT_EQ(std::memcmp(bytes.data(), table.radiances_w_m2_sr().data(), bytes.size()), 0);
-  channel.output_steps = protocol::kOutputDriven;
+  channel.quantity = protocol::PixelQuantity::drive;
   EXPECT_TRUE(console_temperatures(channel).empty()) << "drive is no radiance";
   EXPECT_TRUE(console_temperatures(Channel{}).empty()) << "no band";
 }

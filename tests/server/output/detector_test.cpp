@@ -162,11 +162,8 @@ TEST(Detector, NoiseHasTheStatedTemperatureDifference) {
 }
 
 TEST(Detector, AFrameHasTheSameBitsAgainAndAnotherFrameHasOthers) {
-  const ChannelDetector settings{.netd_k = 0.05,
-                                 .row_noise_k = 0.02,
-                                 .column_noise_k = 0.02,
-                                 .gain_spread_frac = 0.01,
-                                 .bad_px_frac = 0.01};
+  const ChannelDetector settings{
+      .netd_k = 0.05, .row_noise_k = 0.02, .column_noise_k = 0.02, .gain_spread_frac = 0.01};
   Detector one = made(settings);
   Detector two = made(settings);
   const std::vector<float> fourth = frame_of(one, 4, 30.0F);
@@ -211,7 +208,8 @@ TEST(Detector, CountsAreWholeAndTheirEndsAreCounted) {
   for (const auto& [radiance, counts, beyond] :
        {std::tuple{0.0F, 50.0F, false}, std::tuple{1.004F, 150.0F, false},
         std::tuple{1.006F, 151.0F, false}, std::tuple{40.45F, 4095.0F, false},
-        std::tuple{41.0F, 4095.0F, true}, std::tuple{-0.6F, 0.0F, true},
+        std::tuple{41.0F, 4095.0F, true}, std::tuple{-0.504F, 0.0F, false},
+        std::tuple{-0.506F, 0.0F, true},
         std::tuple{std::numeric_limits<float>::quiet_NaN(), 0.0F, true},
         std::tuple{std::numeric_limits<float>::infinity(), 4095.0F, true}}) {
     std::uint32_t clamped = 0;
@@ -239,6 +237,11 @@ TEST(Detector, BadPixelsSeeNothing) {
 TEST(Detector, KelvinNeedABandWithRadiance) {
   EXPECT_FALSE(Detector::make({.netd_k = 0.1}, std::nullopt, kSize).has_value());
   EXPECT_TRUE(Detector::make({.counts_per_w_m2_sr = 1.0}, std::nullopt, kSize).has_value());
+  const physics::Band ultraviolet{0.25, 0.3, {}};
+  EXPECT_FALSE(Detector::make({.netd_k = 0.1}, ultraviolet, kSize).has_value());
+  EXPECT_TRUE(
+      Detector::make({.reference_k = 3000.0, .netd_k = 0.1}, ultraviolet, kSize).has_value());
+  EXPECT_FALSE(Detector::make({.bad_px_frac = 0.1}, kBand, kSize).has_value());
 }
 
 }  // namespace

@@ -371,6 +371,19 @@ TEST(OutputChain, OpticsAndDetectorComeBeforeCorrectionInTheirOrder) {
   const double cos2 = 1.0 / (1.0 + (21.5 * 21.5 + 15.5 * 15.5) / 2500.0);
   EXPECT_NEAR(dim[0], static_cast<double>(soft[0]) * cos2 * cos2, 1e-5);
   EXPECT_FALSE(OutputChain::make(settings, {size, origin.window_px, 0.0}).has_value());
+  // A map of half the size shows the middle of every four pixels, with their angle.
+  const OutputFiles folder;
+  scene::ChannelOutput mapped = settings;
+  mapped.optics.spot = scene::SpotKind::none;
+  mapped.distortion_file = folder.map("half.exr", {15, 15}, [](double x, double y) {
+    return ImagePoint{2.0 * x, 2.0 * y};
+  });
+  auto halved = OutputChain::make(mapped, origin);
+  ASSERT_TRUE(halved.has_value()) << halved.error().text;
+  const std::vector<float> even(image.size(), 1.0F);
+  const std::vector<float> quarter = made(*halved, even);
+  const double last2 = 1.0 / (1.0 + (7.0 * 7.0 + 13.0 * 13.0) / 2500.0);  // 39, 37 from 32, 24
+  EXPECT_NEAR(quarter[14 * 15 + 14], last2 * last2, 1e-5);
   settings.detector.netd_k = 0.2;
   auto noisy = OutputChain::make(settings, origin);
   ASSERT_TRUE(noisy.has_value());

@@ -82,6 +82,17 @@ TEST(Spot, TheVeilIsTheLightBeyondTheSquare) {
   }
 }
 
+TEST(Spot, AnAiryPatternWhoseLightLiesBeyondTheReachIsRefused) {
+  const auto wide = make_spot({.spot = SpotKind::airy, .airy_px = 4.0, .obscuration_frac = 0.9});
+  ASSERT_FALSE(wide.has_value());
+  EXPECT_NE(wide.error().text.find(" % of the light lies beyond 24 px"), std::string::npos)
+      << wide.error().text;
+  const Spot half = spot_of({.spot = SpotKind::airy, .airy_px = 4.0, .obscuration_frac = 0.5});
+  // Beyond a circle of 24.5 px lie 6.4 % (by numerical integration), and the square holds more.
+  EXPECT_LT(half.veil_frac, 0.064);
+  EXPECT_GT(half.veil_frac, 0.045);
+}
+
 TEST(Spot, AnObscurationDrawsTheFirstRingInwards) {
   // The first zero of jinc(x) = e^2 jinc(e x) is at x = 3.8317 without obscuration and 3.1444 for
   // e = 0.5.

@@ -69,6 +69,8 @@ struct ChannelDescription {
   std::uint32_t window_width_px = 0;  ///< size of that part of the sensor's image
   std::uint32_t window_height_px = 0;
   std::uint16_t output_steps = 0;  ///< protocol::OutputSteps: what is done to its pixels
+  /// Quantity of its pixels; absent: the daemon does not say.
+  std::optional<protocol::PixelQuantity> quantity = std::nullopt;
 
   /// Returns the place in the sensor's image that a place of a frame shows. Both count in px from
   /// the top left corner, and pixel (0, 0) has its centre at (0.5, 0.5). Absent where only the
