@@ -8,31 +8,27 @@
 
 #include "emit/physics/check.hpp"
 #include "output/noise.hpp"
-#include "output/wide.hpp"
 
 namespace emit::server {
 namespace {
 
-/// Adds temporal noise to a row: its variance is that of the reference, of which a share grows with
-/// radiance.
+/// Temporal noise: its variance is that before the reference, of which a share grows with radiance.
 struct Noise {
   float sigma = 0.0F;
   float still_frac = 1.0F;
   float by_radiance = 0.0F;  ///< per W m-2 sr-1
 };
 
-EMIT_LOOP_BODY void add_noise_body(const Noise& noise, std::span<const float> normals,
-                                   std::span<float> line) noexcept {
+void add_noise(const Noise& noise, std::span<const float> normals, std::span<float> line) noexcept {
+  if (noise.by_radiance == 0.0F) {
+    for (std::size_t i = 0; i < line.size(); ++i) line[i] += noise.sigma * normals[i];
+    return;
+  }
   for (std::size_t i = 0; i < line.size(); ++i) {
     const float seen = line[i] > 0.0F ? line[i] : 0.0F;
     const float share = noise.still_frac + noise.by_radiance * seen;
     line[i] += noise.sigma * std::sqrt(share) * normals[i];
   }
-}
-
-void add_noise(const Noise& noise, std::span<const float> normals, std::span<float> line) noexcept {
-  if (noise.by_radiance != 0.0F) return add_noise_body(noise, normals, line);
-  for (std::size_t i = 0; i < line.size(); ++i) line[i] += noise.sigma * normals[i];
 }
 
 }  // namespace

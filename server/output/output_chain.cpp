@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "emit/physics/check.hpp"
+#include "output/window_margin.hpp"
 
 namespace emit::server {
 
@@ -54,18 +55,6 @@ std::uint16_t steps_of(const scene::ChannelOutput& settings) noexcept {
       if_so(settings.optics != scene::ChannelOptics{}, protocol::kOutputBlurred) |
       if_so(detects(settings.detector), protocol::kOutputDetected) |
       if_so(settings.detector.counts_per_w_m2_sr > 0.0, protocol::kOutputCounted));
-}
-
-/// Returns a window with a margin on all sides, as far as the image has it.
-scene::PixelRect grown(const scene::PixelRect& window, std::uint32_t margin_px,
-                       const ImageSize& image) noexcept {
-  const std::uint32_t left = std::min(window.x_px, margin_px);
-  const std::uint32_t top = std::min(window.y_px, margin_px);
-  const std::uint32_t right = std::min(image.width_px - window.x_px - window.width_px, margin_px);
-  const std::uint32_t bottom =
-      std::min(image.height_px - window.y_px - window.height_px, margin_px);
-  return {window.x_px - left, window.y_px - top, window.width_px + left + right,
-          window.height_px + top + bottom};
 }
 
 Result<PositionMap::Source> positions_of(const scene::ChannelOutput& settings,

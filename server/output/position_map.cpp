@@ -10,6 +10,7 @@
 #include "emit/image/exr_image.hpp"
 #include "emit/physics/check.hpp"
 #include "output/sample_row.hpp"
+#include "output/wide.hpp"
 
 namespace emit::server {
 
@@ -117,7 +118,7 @@ void PositionMap::sample_line(std::span<const float> image, const glm::vec2& shi
                            static_cast<std::int32_t>(part_.size.width_px) - 1,
                            static_cast<std::int32_t>(part_.size.height_px) - 1,
                            outside_w_m2_sr_};
-  if (can_sample_wide()) {
+  if (has_wide()) {
     sample_row_wide(sampled, line);
   } else {
     sample_row_plain(sampled, line);

@@ -2,6 +2,7 @@
 #include "output/sample_row.hpp"
 
 #include "emit/physics/check.hpp"
+#include "output/wide.hpp"
 
 #if defined(__x86_64__)
 #include <immintrin.h>
@@ -45,17 +46,12 @@ void sample_row_plain(const SampledRow& row, std::span<float> line) noexcept {
 
 #if defined(__x86_64__)
 
-bool can_sample_wide() noexcept {
-  static const bool has = __builtin_cpu_supports("avx2") != 0;
-  return has;
-}
-
 // The wide loop does what the plain one does, step by step. Products and sums are never fused, so
 // that the bits are the same.
 
 __attribute__((target("avx2"))) void sample_row_wide(const SampledRow& row,
                                                      std::span<float> line) noexcept {
-  EMIT_DCHECK(can_sample_wide());
+  EMIT_DCHECK(has_wide());
   const __m256 shift_x = _mm256_set1_ps(row.shift_px.x);
   const __m256 shift_y = _mm256_set1_ps(row.shift_px.y);
   const __m256 zero = _mm256_setzero_ps();
@@ -107,10 +103,6 @@ __attribute__((target("avx2"))) void sample_row_wide(const SampledRow& row,
 }
 
 #else
-
-bool can_sample_wide() noexcept {
-  return false;
-}
 
 void sample_row_wide(const SampledRow& row, std::span<float> line) noexcept {
   sample_row_plain(row, line);

@@ -20,12 +20,9 @@ struct SampledRow {
   float outside = 0.0F;  ///< value beyond half a pixel around the image, and for NaN
 };
 
-/// Returns whether the processor has what sample_row_wide() needs.
-[[nodiscard]] bool can_sample_wide() noexcept;
-
 /// Writes the bilinear values of a row.
 void sample_row_plain(const SampledRow& row, std::span<float> line) noexcept;
-/// @pre can_sample_wide()
+/// The same, with AVX2. @pre has_wide()
 void sample_row_wide(const SampledRow& row, std::span<float> line) noexcept;
 
 }  // namespace emit::server

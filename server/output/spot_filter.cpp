@@ -9,6 +9,7 @@
 
 #include "emit/physics/check.hpp"
 #include "output/wide.hpp"
+#include "output/window_margin.hpp"
 
 namespace emit::server {
 namespace {
@@ -109,17 +110,6 @@ Decomposed decompose(const std::vector<double>& matrix, std::size_t n) {
     if (!turned) break;
   }
   return out;
-}
-
-/// Returns a rectangle grown on all sides, as far as the image reaches.
-scene::PixelRect grown(const scene::PixelRect& part, std::uint32_t by_px,
-                       const protocol::ImageSize& image) noexcept {
-  const std::uint32_t left = std::min(part.x_px, by_px);
-  const std::uint32_t top = std::min(part.y_px, by_px);
-  const std::uint32_t right = std::min(image.width_px - part.x_px - part.width_px, by_px);
-  const std::uint32_t bottom = std::min(image.height_px - part.y_px - part.height_px, by_px);
-  return {part.x_px - left, part.y_px - top, part.width_px + left + right,
-          part.height_px + top + bottom};
 }
 
 }  // namespace

@@ -9,12 +9,14 @@
 #include <random>
 #include <vector>
 
+#include "output/wide.hpp"
+
 namespace emit::server {
 namespace {
 
 /// A journal of one machine replays on another: the loops may not differ by a bit.
 TEST(SampleRow, EightPixelsAtATimeGiveTheBitsOfOne) {
-  if (!can_sample_wide()) GTEST_SKIP() << "no AVX2";
+  if (!has_wide()) GTEST_SKIP() << "no AVX2";
   std::mt19937 random(3);
   std::uniform_real_distribution<float> any(0.0F, 1.0F);
   for (const auto& [columns, rows] : {std::pair{1, 1}, {1, 7}, {9, 1}, {37, 21}}) {
