@@ -271,6 +271,20 @@ void warn_of_default_place_and_time(const Node& root, const Node& place, Scenari
   }
 }
 
+/// Smoke drifts with the wind, whose direction has to be known.
+void warn_of_smoke_without_wind(ScenarioDesc& scenario) {
+  if (scenario.gas.smokes.empty()) return;
+  const bool known = scenario.weather.empty()
+                         ? scenario.clear_sky.wind_from_rad.has_value()
+                         : std::ranges::all_of(scenario.weather, [](const auto& sample) {
+                             return sample.wind_from_rad.has_value();
+                           });
+  if (known) return;
+  scenario.warnings.push_back(fmt::format(
+      "{}: smoke does not drift: the weather states no direction of the wind ('wind_from_deg')",
+      scenario.file.string()));
+}
+
 }  // namespace
 
 Result<std::vector<scene::Material>> load_materials(const std::filesystem::path& file,
@@ -386,6 +400,8 @@ Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
   scenario.objects =
       resolve_objects(root, scenario.materials, options.require_scene_files, diagnostics);
   scenario.contacts = resolve_contacts(root, scenario.objects, scenario.materials, diagnostics);
+  scenario.gas = resolve_gas(root, scenario.objects, known, diagnostics);
+  warn_of_smoke_without_wind(scenario);
   // Channels may be carried by entities.
   check_channels(root, scenario, options.require_scene_files, diagnostics);
   if (!diagnostics.empty()) {

@@ -16,6 +16,7 @@ scenes='
 airfield       13     320 256 all
 block-on-road  12600  320 256 all
 box            12600  320 240 all
+decoys         2.6    320 256 all
 engage         4      320 256 all
 ribbed         7200   320 256 all weather.file=
 statue         12600  320 240 day,dusk

@@ -50,6 +50,9 @@ FILES = {
             "The same on a GPU, without the axis of triangles. A frame of a third of a millisecond shows what the "
             "processor does for every object.",
             "emit bench scaling --method cached --axis steps --axis pixels --axis objects --axis samples"),
+        "gas": (
+            "Frame time of the scenario `decoys` with each kind of gas, beside the same scene without gas.",
+            "emit bench gas"),
         "crowd": (
             "The airfield alone and with ten thousand figures of a thousand triangles each.",
             "emit bench crowd"),
@@ -195,6 +198,11 @@ def crowd_tables(rows):
                  ("frame, ms", field("frame_ms_median")), ("ratio", field("ratio"))], rows)
 
 
+def gas_tables(rows):
+    yield table([("gas", field("gas")), ("puffs", field("puffs")), ("frame, ms", field("frame_ms_median")),
+                 ("ratio", field("ratio")), ("spread", field("self_ratio_spread"))], rows)
+
+
 def turn_tables(rows):
     yield table([("case", field("case")), ("budget, ms", field("budget_ms")), ("frame, ms", field("frame_ms_median")),
                  ("longest, ms", field("frame_ms_max_median_of_runs")), ("longest / median", field("ratio")),
@@ -259,7 +267,7 @@ def isolation_tables(rows):
 
 
 TABLES = {"paper": paper_tables, "error-vs-time": error_tables, "thermal-truth": truth_tables,
-          "subpixel": subpixel_tables, "scaling": scaling_tables, "crowd": crowd_tables, "turn": turn_tables,
+          "subpixel": subpixel_tables, "scaling": scaling_tables, "crowd": crowd_tables, "gas": gas_tables, "turn": turn_tables,
           "budget": budget_tables, "live": live_tables, "stream": stream_tables, "isolation": isolation_tables}
 
 

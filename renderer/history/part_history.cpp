@@ -96,6 +96,16 @@ PartHeat PartHistory::at(std::int64_t sim_time_ns) const noexcept {
   return {0.0, kHeldContactW_m2K, behind_k(step, sim_time_ns)};
 }
 
+std::optional<double> PartHistory::throttle_frac(std::int64_t sim_time_ns) const noexcept {
+  const std::size_t after = first_after(sim_time_ns);
+  if (after == 0 || !curve_.given) return std::nullopt;
+  const Step& step = steps_[after - 1];
+  if (step.command.kind != PartCommand::Kind::throttle) return std::nullopt;
+  const double span_k = curve_.full_k - curve_.idle_k;
+  if (span_k == 0.0) return step.command.value;
+  return std::clamp((behind_k(step, sim_time_ns) - curve_.idle_k) / span_k, 0.0, 1.0);
+}
+
 PartHeatSpan PartHistory::over(std::int64_t begin_ns, std::int64_t end_ns) const noexcept {
   EMIT_DCHECK_OP(begin_ns, <, end_ns);
   PartHeatSpan out{at(begin_ns - 1), at(end_ns - 1)};

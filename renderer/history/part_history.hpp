@@ -2,6 +2,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -50,6 +51,9 @@ class PartHistory {
   /// cold_k.
   [[nodiscard]] PartHeat at(std::int64_t sim_time_ns) const noexcept;
 
+  /// Returns how far the part is driven at an instant, 0 (idle) to 1 (full), as the temperature
+  /// behind the skin follows the throttle. Empty if no throttle drives it.
+  [[nodiscard]] std::optional<double> throttle_frac(std::int64_t sim_time_ns) const noexcept;
   /// Returns the heat over an interval: the mean power, and the contact as it is just before either
   /// end. A contact that begins in the interval therefore grows over it.
   /// @pre begin_ns < end_ns

@@ -116,8 +116,9 @@ void TargetPass::draw_geometry(const SceneVertexArrays& vertices, const DrawList
   geometry_.front().draw(vertices, lists, records, std::span(views_).first(params_.count));
 }
 
-void TargetPass::resolve(const RadiancePass& radiance, const gl::Buffer& frame_buffer,
-                         const gl::Buffer& output, std::size_t stats_offset) const noexcept {
+void TargetPass::resolve(const RadiancePass& radiance, const GasPass* gas,
+                         const gl::Buffer& frame_buffer, const gl::Buffer& output,
+                         std::size_t stats_offset) const noexcept {
   if (params_.count == 0) return;
   // Compute the radiance of all samples.
   const std::uint32_t zero = 0;
@@ -128,6 +129,9 @@ void TargetPass::resolve(const RadiancePass& radiance, const gl::Buffer& frame_b
   for (std::uint32_t t = 0; t < params_.count; ++t) {
     frames_buffer_.bind_uniform(EMIT_BIND_FRAME, t * sizeof(WindowFrame), sizeof(gpu::FrameParams));
     radiance.dispatch(window_size_px(frames_[t].params.rendered_window_px));
+  }
+  if (gas != nullptr) {
+    for (std::size_t t = 0; t < params_.count; ++t) gas->draw(t + 1);
   }
   // Add up the rows of the windows.
   glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);

@@ -10,6 +10,7 @@
 #include "emit/physics/error.hpp"
 #include "gl/objects.hpp"
 #include "gl/program.hpp"
+#include "passes/gas_pass.hpp"
 #include "passes/geometry_pass.hpp"
 #include "passes/radiance_pass.hpp"
 #include "shared/target_params.glsl.h"
@@ -39,10 +40,15 @@ class TargetPass {
   /// Draws the geometry of the windows.
   void draw_geometry(const SceneVertexArrays& vertices, const DrawLists& lists,
                      const gl::Buffer& records) const noexcept;
+  /// Returns the parameters of the frame as the windows of prepare() see it, in their order.
+  [[nodiscard]] const gpu::FrameParams& window_frame(std::size_t target) const noexcept {
+    return frames_[target].params;
+  }
+  [[nodiscard]] std::size_t windows() const noexcept { return params_.count; }
   /// Adds the targets to the planes of `output`, which starts with them; counters of flagged pixels
-  /// lie from `stats_offset` on. `frame_buffer` holds the parameters of the frame. Afterwards
+  /// lie from `stats_offset` on. `gas`, if there is any, is drawn over the samples. `frame_buffer` holds the parameters of the frame. Afterwards
   /// frame, output and geometry are bound as the radiance pass of the windows needs them.
-  void resolve(const RadiancePass& radiance, const gl::Buffer& frame_buffer,
+  void resolve(const RadiancePass& radiance, const GasPass* gas, const gl::Buffer& frame_buffer,
                const gl::Buffer& output, std::size_t stats_offset) const noexcept;
 
  private:

@@ -7,6 +7,7 @@
 #include <array>
 #include <chrono>
 #include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
 #include <limits>
 #include <optional>
 
@@ -24,6 +25,7 @@
 #include "history/foster_setup.hpp"
 #include "history/pose_history.hpp"
 #include "passes/enlarge_pass.hpp"
+#include "passes/gas_pass.hpp"
 #include "passes/geometry_pass.hpp"
 #include "passes/radiance_pass.hpp"
 #include "passes/readback_ring.hpp"
@@ -31,6 +33,7 @@
 #include "stages/band_model.hpp"
 #include "stages/cached_stage.hpp"
 #include "stages/frame_setup.hpp"
+#include "stages/gas_model.hpp"
 #include "stages/per_frame_stage.hpp"
 
 namespace emit::renderer {
@@ -115,6 +118,7 @@ struct FramePasses {
   RadiancePass radiance;
   std::optional<EnlargePass> enlarge;  ///< empty when no frame may shed work
   std::optional<TargetPass> targets;   ///< empty when no target can be small
+  std::optional<GasPass> gas;          ///< empty when the scenario has no gas
 };
 
 /// Renderer on an OpenGL device.
@@ -122,7 +126,7 @@ class GlRenderer final : public Renderer {
  public:
   GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext context,
              const scene::SceneGeometry& geometry, const OutputOptions& output, BandModel bands,
-             FramePasses passes);
+             std::optional<GasModel> gas, FramePasses passes);
   /// Sets the thermal method, which reads history(). It is called before anything else.
   void set_stage(std::unique_ptr<ThermalStage> stage) { stage_ = std::move(stage); }
   [[nodiscard]] const SceneHistory& history() const noexcept { return history_; }
@@ -192,6 +196,8 @@ class GlRenderer final : public Renderer {
   [[nodiscard]] TrianglesPerLevel count_triangles(const FrameRequest& request) noexcept;
   /// Does the work of the CPU for a frame and sends its data to the device.
   void prepare(const FrameRequest& request, const QualityLevel& level) noexcept;
+  /// Makes the gas of a frame and finds the pixels that it covers.
+  void prepare_gas(const FrameRequest& request) noexcept;
   void upload_frame() noexcept;
   void bind_frame() const noexcept;
   /// Issues the passes from geometry to the planes of the output image.
@@ -208,6 +214,7 @@ class GlRenderer final : public Renderer {
   SceneHistory history_;
   std::vector<std::uint32_t> entity_ids_;
   BandModel bands_;
+  std::optional<GasModel> gas_;
   FramePasses passes_;
   std::unique_ptr<ThermalStage> stage_;
   bool warm_ = false;  ///< the stage has been warmed up
@@ -274,7 +281,7 @@ std::size_t planes_bytes(const scene::ScenarioDesc& scenario, const OutputOption
 
 GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext context,
                        const scene::SceneGeometry& geometry, const OutputOptions& output,
-                       BandModel bands, FramePasses passes)
+                       BandModel bands, std::optional<GasModel> gas, FramePasses passes)
     : scenario_(scenario),
       output_(output),
       context_(std::move(context)),
@@ -283,6 +290,7 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
                    .warnings = scenario.warnings},
       history_{Environment(scenario), {}, {}},
       bands_(std::move(bands)),
+      gas_(std::move(gas)),
       passes_(std::move(passes)),
       frame_buffer_(gl::Buffer::dynamic(sizeof(gpu::FrameParams))),
       band_buffer_(gl::Buffer::dynamic(EMIT_MAX_BANDS * sizeof(gpu::BandParams))),
@@ -469,7 +477,22 @@ void GlRenderer::prepare(const FrameRequest& request, const QualityLevel& level)
   frame_params_.sensor_height_m = static_cast<float>(sensor_m);
   bands_.update(stage_->forcing_now(), sun, sensor_m);
   if (passes_.targets) passes_.targets->prepare(targets, camera.view, frame_params_);
+  if (gas_) prepare_gas(request);
   upload_frame();
+}
+
+void GlRenderer::prepare_gas(const FrameRequest& request) noexcept {
+  gas_->update({.sim_time_ns = request.sim_time_ns,
+                .camera_world_m = request.sensor_pose.position_world_m,
+                .world_from_sensor = glm::dmat3(glm::mat3(frame_params_.relworld_from_sensor)),
+                .sensor_height_m = double{frame_params_.sensor_height_m}},
+               stage_->forcing_now(), history_, bands_, frame_params_);
+  GasTiles& tiles = passes_.gas->tiles();
+  tiles.begin(gas_->puffs(), gas_->term_frac());
+  tiles.add_output(frame_params_);
+  for (std::size_t t = 0; passes_.targets && t < passes_.targets->windows(); ++t) {
+    tiles.add_target(passes_.targets->window_frame(t));
+  }
 }
 
 std::vector<RadianceTerms> GlRenderer::radiance_terms(const FrameView& view, const glm::uvec2& px,
@@ -497,6 +520,21 @@ std::vector<RadianceTerms> GlRenderer::radiance_terms(const FrameView& view, con
   for (std::size_t b = 0; b < bands_.bands(); ++b) {
     out.push_back(bands_.terms(b, seen, view.incoming_w_m2_sr[b][i]));
   }
+  if (!gas_) return out;
+  // See the surface through the gas in front of it.
+  const float boresight_m = seen.surface ? view.depth_m[i] : EMIT_SKY_DEPTH_M;
+  const GasTiles& tiles = passes_.gas->tiles();
+  const GasModel::Seen gas =
+      gas_->seen(tiles.output(), px, boresight_m, tiles.output_samples(px));
+  for (std::size_t b = 0; b < out.size(); ++b) {
+    RadianceTerms& terms = out[b];
+    terms.gas_frac = gas.through_frac[b];
+    terms.gas_w_m2_sr = gas.added_w_m2_sr[b];
+    for (double* part : {&terms.emission_w_m2_sr, &terms.sky_w_m2_sr, &terms.neighbours_w_m2_sr,
+                         &terms.sun_w_m2_sr, &terms.path_w_m2_sr}) {
+      *part *= terms.gas_frac;
+    }
+  }
   return out;
 }
 
@@ -505,6 +543,7 @@ void GlRenderer::upload_frame() noexcept {
   band_buffer_.upload(bands_.params());
   if (bands_.air_model() != 0) air_buffer_.upload(bands_.air_nodes());
   if (passes_.targets) passes_.targets->upload();
+  if (passes_.gas) passes_.gas->upload();
   stage_->upload();
 }
 
@@ -654,9 +693,12 @@ void GlRenderer::draw_frame(const QualityLevel& level, StageTimes& stages) noexc
   } else {
     passes_.radiance.dispatch(window_size_px(window_px));
   }
-  // Put small targets into the image last, because they have its pixels at every quality level.
+  // Draw gas over the image, then put small targets into it, because both have its pixels at every
+  // quality level. Gas in front of a target is drawn over the target's samples.
+  const GasPass* gas = passes_.gas ? &*passes_.gas : nullptr;
+  if (gas != nullptr) gas->draw(0);
   if (passes_.targets) {
-    passes_.targets->resolve(passes_.radiance, frame_buffer_, output_buffer_, stats_offset_);
+    passes_.targets->resolve(passes_.radiance, gas, frame_buffer_, output_buffer_, stats_offset_);
   }
   clock_.mark(stages.radiance_ms);
 }
@@ -724,7 +766,18 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
   auto radiance_pass =
       RadiancePass::create(scenario.thermal, radiance_content(*bands, output), context->software());
   if (!radiance_pass) return tl::unexpected(std::move(radiance_pass.error()));
-  FramePasses passes{std::move(*geometry_pass), std::move(*radiance_pass), {}, {}};
+  FramePasses passes{std::move(*geometry_pass), std::move(*radiance_pass), {}, {}, {}};
+  std::optional<GasModel> gas;
+  if (!scenario.gas.empty()) {
+    auto model = GasModel::build(scenario);
+    if (!model) return tl::unexpected(std::move(model.error()));
+    gas = std::move(*model);
+    auto gas_pass = GasPass::create({.bands = static_cast<std::uint32_t>(scenario.bands.size()),
+                                     .reversed_depth = cached,
+                                     .output_px = glm::uvec2(width_px, height_px)});
+    if (!gas_pass) return tl::unexpected(std::move(gas_pass.error()));
+    passes.gas = std::move(*gas_pass);
+  }
   if (cached && output.ladder != Ladder::none) {
     auto enlarge_pass =
         EnlargePass::create(static_cast<std::uint32_t>(scenario.bands.size()),
@@ -743,7 +796,8 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
 
   // Create the renderer, then the thermal method, which reads its history.
   auto renderer = std::make_unique<GlRenderer>(scenario, std::move(*context), *geometry, output,
-                                               std::move(*bands), std::move(passes));
+                                               std::move(*bands), std::move(gas),
+                                               std::move(passes));
   auto stage =
       cached ? CachedStage::create(scenario, std::move(*geometry), std::move(*foster),
                                    renderer->history(), renderer->bands(), renderer->software())

@@ -311,18 +311,62 @@ void BandModel::update(const physics::Forcing& forcing, const physics::SunPositi
   }
 }
 
+std::span<const physics::AirView::Node> BandModel::air_nodes_of(std::size_t band) const noexcept {
+  return std::span(air_nodes_)
+      .subspan(params_[band].air_view_first, entries_[band].view ? physics::AirView::kNodes : 0);
+}
+
+double air_transmittance(std::span<const physics::AirView::Node> nodes, const BandModel::Sight& sight,
+                         float temperature_k) noexcept {
+  const float target_m = sight.sensor_height_m + sight.range_m * sight.sin_elevation;
+  const auto node = physics::air_sight_node(nodes, target_m, sight.range_m);
+  // Between 300 K, 800 K and the sun the extinction goes linearly in 1 / T.
+  const float inverse = 1.0F / std::max(temperature_k, 200.0F);
+  const float warm = (1.0F / 300.0F - inverse) / (1.0F / 300.0F - 1.0F / 800.0F);
+  const float hot = (1.0F / 800.0F - inverse) / (1.0F / 800.0F - 1.0F / 5772.0F);
+  const float log_extinction = hot > 0.0F ? std::lerp(node[1], node[2], std::min(hot, 1.0F))
+                                          : std::lerp(node[0], node[1], warm);
+  return std::exp(-std::exp(log_extinction) * sight.range_m);
+}
+
+BandModel::AirWay BandModel::air_way(std::size_t band, const Sight& sight,
+                                     float temperature_k) const noexcept {
+  const Entry& entry = entries_[band];
+  const gpu::BandParams& params = params_[band];
+  AirWay out;
+  if (entry.view) {
+    const auto nodes = air_nodes_of(band);
+    const float target_m = sight.sensor_height_m + sight.range_m * sight.sin_elevation;
+    const auto node = physics::air_sight_node(nodes, target_m, sight.range_m);
+    out.air_frac = air_transmittance(nodes, sight, temperature_k);
+    out.air_sun_frac = std::exp(-std::exp(node[2]) * sight.range_m);
+    out.path_w_m2_sr = physics::air_path_w_m2_sr(node, sight.range_m);
+  } else if (entry.air) {
+    const auto air = entry.air->along(sight.range_m, sight.sin_elevation);
+    out.air_frac = out.air_sun_frac = air.transmittance_frac;
+    out.path_w_m2_sr = air.path_radiance_w_m2_sr;
+  } else if (entry.has_sky) {
+    out.air_frac = 0.0;
+    for (glm::length_t term = 0; term < EMIT_MAX_ATMOSPHERE_TERMS; ++term) {
+      out.air_frac += params.terms_amplitude_frac[term] *
+                      std::exp(-params.terms_extinction_per_m[term] * sight.range_m);
+    }
+    out.air_sun_frac = out.air_frac;
+    out.path_w_m2_sr = (1.0 - out.air_frac) * params.air_radiance_w_m2_sr;
+  }
+  return out;
+}
+
 RadianceTerms BandModel::terms(std::size_t band, const Seen& seen,
                                float incoming_w_m2_sr) const noexcept {
   const Entry& entry = entries_[band];
   const gpu::BandParams& params = params_[band];
-  const auto air_nodes =
-      std::span(air_nodes_)
-          .subspan(params.air_view_first, entry.view ? physics::AirView::kNodes : 0);
   RadianceTerms out;
   if (!seen.surface) {
     const float clouds = params.cloud_radiance_w_m2_sr;
     if (entry.view) {
-      out.path_w_m2_sr = physics::air_sky(air_nodes, seen.sin_elevation).path_radiance_w_m2_sr;
+      out.path_w_m2_sr =
+          physics::air_sky(air_nodes_of(band), seen.sin_elevation).path_radiance_w_m2_sr;
     } else if (entry.air) {
       out.path_w_m2_sr =
           params.clear_sky_frac * entry.air->out(seen.sin_elevation).path_radiance_w_m2_sr + clouds;
@@ -336,31 +380,11 @@ RadianceTerms BandModel::terms(std::size_t band, const Seen& seen,
     return out;
   }
   // Find what the air lets through and what it adds.
-  if (entry.view) {
-    const float target_m = seen.sensor_height_m + seen.range_m * seen.sin_elevation;
-    const auto node = physics::air_sight_node(air_nodes, target_m, seen.range_m);
-    // Between 300 K, 800 K and the sun the extinction goes linearly in 1 / T.
-    const float inverse = 1.0F / std::max(seen.temperature_k, 200.0F);
-    const float warm = (1.0F / 300.0F - inverse) / (1.0F / 300.0F - 1.0F / 800.0F);
-    const float hot = (1.0F / 800.0F - inverse) / (1.0F / 800.0F - 1.0F / 5772.0F);
-    const float log_extinction = hot > 0.0F ? std::lerp(node[1], node[2], std::min(hot, 1.0F))
-                                            : std::lerp(node[0], node[1], warm);
-    out.air_frac = std::exp(-std::exp(log_extinction) * seen.range_m);
-    out.air_sun_frac = std::exp(-std::exp(node[2]) * seen.range_m);
-    out.path_w_m2_sr = physics::air_path_w_m2_sr(node, seen.range_m);
-  } else if (entry.air) {
-    const auto air = entry.air->along(seen.range_m, seen.sin_elevation);
-    out.air_frac = out.air_sun_frac = air.transmittance_frac;
-    out.path_w_m2_sr = air.path_radiance_w_m2_sr;
-  } else if (entry.has_sky) {
-    out.air_frac = 0.0;
-    for (glm::length_t term = 0; term < EMIT_MAX_ATMOSPHERE_TERMS; ++term) {
-      out.air_frac += params.terms_amplitude_frac[term] *
-                      std::exp(-params.terms_extinction_per_m[term] * seen.range_m);
-    }
-    out.air_sun_frac = out.air_frac;
-    out.path_w_m2_sr = (1.0 - out.air_frac) * params.air_radiance_w_m2_sr;
-  }
+  const AirWay way = air_way(
+      band, {seen.range_m, seen.sin_elevation, seen.sensor_height_m}, seen.temperature_k);
+  out.air_frac = way.air_frac;
+  out.air_sun_frac = way.air_sun_frac;
+  out.path_w_m2_sr = way.path_w_m2_sr;
   // Split what leaves the surface.
   out.emissivity_frac = emissivity_frac(seen.material, band);
   const double reflected = (1.0 - out.emissivity_frac) * out.air_frac;

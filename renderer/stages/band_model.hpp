@@ -45,6 +45,22 @@ class BandModel final : public BandLights {
     return tables_[first_emissivity_ + material * entries_.size() + band];
   }
 
+  /// Air between the camera and a point, by band.
+  struct AirWay {
+    double air_frac = 1.0;      ///< transmittance for what a source at the temperature emits
+    double air_sun_frac = 1.0;  ///< transmittance for reflected sunlight
+    double path_w_m2_sr = 0.0;
+  };
+  /// Line of sight to a point.
+  struct Sight {
+    float range_m = 0.0F;
+    float sin_elevation = 0.0F;
+    float sensor_height_m = 0.0F;  ///< above sea level
+  };
+  /// Returns the air on a line of sight to a source of a temperature, at the instant of update().
+  [[nodiscard]] AirWay air_way(std::size_t band, const Sight& sight,
+                               float temperature_k) const noexcept;
+
   /// Surface or sky of a pixel, as the radiance pass reads it.
   struct Seen {
     bool surface = false;  ///< false: sky, of which only the elevation counts
@@ -102,6 +118,9 @@ class BandModel final : public BandLights {
     double sun_outside_w_m2 = 0;  ///< in band, normal to the sun, at 1 au
     bool has_sky = false;         ///< false: a band without air shows no sky
   };
+  /// Table of the built-in air of a band; empty for other air.
+  [[nodiscard]] std::span<const physics::AirView::Node> air_nodes_of(
+      std::size_t band) const noexcept;
   /// Makes the views of the bands with built-in air.
   [[nodiscard]] physics::Result<void> build_views(const scene::ScenarioDesc& scenario);
   /// Weather of an instant in the terms of the picture.
@@ -136,6 +155,12 @@ class BandModel final : public BandLights {
   std::uint32_t max_terms_ = 0;
   std::uint32_t first_emissivity_ = 0;
 };
+
+/// Returns the transmittance of built-in air on a line of sight for what a source of a temperature
+/// emits, from the table of a camera. RT-safe.
+/// @pre nodes.size() == physics::AirView::kNodes
+[[nodiscard]] double air_transmittance(std::span<const physics::AirView::Node> nodes,
+                                       const BandModel::Sight& sight, float temperature_k) noexcept;
 
 /// Materials as the shaders read them. Temperature offsets count from `reference_k`. Setup only.
 [[nodiscard]] std::vector<gpu::MaterialParams> material_params(

@@ -556,6 +556,62 @@ TEST_F(ConfigTest, joints_name_two_bodies_by_object_or_material) {
               ::testing::HasSubstr("'resistance_m2_k_w'"));
 }
 
+TEST_F(ConfigTest, gas_is_read_checked_and_printed) {
+  const std::string body =
+      "[weather]\nwind_from_deg = 270\n[[object]]\nname = \"jet\"\nentity_id = 3\ngltf = "
+      "\"a.glb\"\n[[object.parts]]\nname = \"engine\"\nmaterial = \"concrete\"\nidle_k = 500\n"
+      "full_k = 900\n";
+  const auto loaded = scenario(
+      body +
+      "[[plume]]\nobject = \"jet\"\npart = \"engine\"\nnozzle_m = [-5, 0.5, -1]\nexit_k = 1600\n"
+      "[[flare]]\nobject = \"jet\"\nintensity_w_sr = { \"3-5\" = 2500.0 }\n"
+      "[[smoke]]\nname = \"screen\"\nposition_m = [1, 2, 3]\nstart_s = -5\nstop_s = 20.5\n"
+      "band_extinction_m2_g = { \"8-12\" = 0.38 }\n"
+      "[[fire]]\nheat_release_w = 2e6\n");
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
+  const scene::GasDesc& gas = loaded->gas;
+  ASSERT_EQ(gas.plumes.size(), 1U);
+  EXPECT_EQ(gas.plumes[0].name, "plume_1");
+  EXPECT_EQ(gas.plumes[0].nozzle_body_m, glm::dvec3(-5.0, 0.5, -1.0));
+  EXPECT_EQ(gas.plumes[0].full.exit_k, 1600.0);
+  EXPECT_EQ(gas.plumes[0].idle.exit_k, 1600.0);  // full power where the file says nothing else
+  ASSERT_EQ(gas.flares.size(), 1U);
+  ASSERT_EQ(gas.flares[0].intensity_w_sr.size(), 1U);
+  EXPECT_EQ(gas.flares[0].intensity_w_sr[0].value, 2500.0);
+  ASSERT_EQ(gas.smokes.size(), 1U);
+  EXPECT_EQ(gas.smokes[0].start_ns, -5'000'000'000);
+  EXPECT_EQ(gas.smokes[0].stop_ns, 20'500'000'000);
+  EXPECT_EQ(gas.smokes[0].band_extinction_m2_g[0].value, 0.38);
+  ASSERT_EQ(gas.fires.size(), 1U);
+  EXPECT_EQ(gas.fires[0].heat_release_w, 2e6);
+  EXPECT_EQ(gas.puffs(), 20U + 1U + 48U + 12U);
+  const auto again = load_scenario(write("p.toml", print_scenario(*loaded)), {}, options_);
+  ASSERT_TRUE(again.has_value()) << again.error().text;
+  EXPECT_EQ(print_scenario(*again), print_scenario(*loaded));
+  EXPECT_EQ(again->gas.smokes[0].stop_ns, gas.smokes[0].stop_ns);
+  const std::vector<std::pair<std::string, std::string>> faults{
+      {"[[plume]]\nobject = \"yet\"\n", "no object is named 'yet', did you mean 'jet'?"},
+      {"[[plume]]\nobject = \"jet\"\npart = \"engines\"\n",
+       "object 'jet' has no part 'engines', did you mean 'engine'?"},
+      {"[[plume]]\nobject = \"jet\"\ndirection = [0, 0, 0]\n", "'direction' has no length"},
+      {"[[plume]]\nobject = \"jet\"\nco2_frac = 0.6\nh2o_frac = 0.6\n",
+       "'co2_frac' and 'h2o_frac' add up to above 1"},
+      {"[[plume]]\n", "key 'object' is missing"},
+      {"[[flare]]\nobject = \"jet\"\nintensity_w_sr = { \"3-6\" = 1.0 }\n",
+       "'intensity_w_sr': there is no band '3-6', did you mean '3-5'?"},
+      {"[[smoke]]\nstart_s = 5\nstop_s = 5\n", "'stop_s' must be after 'start_s'"},
+      {"[[fire]]\nflame_k = 20\n", "'flame_k' is 20, must be 600 .. 2500"},
+      {"[[smoke]]\n[[smoke]]\n[[smoke]]\n[[smoke]]\n[[smoke]]\n[[smoke]]\n",
+       "take 288 puffs of gas: 256 are possible"},
+  };
+  for (const auto& [text, message] : faults) {
+    EXPECT_THAT(scenario_error(body + text), ::testing::HasSubstr(message)) << text;
+  }
+  const auto calm = scenario("[[smoke]]\n");
+  ASSERT_TRUE(calm.has_value()) << calm.error().text;
+  EXPECT_THAT(calm->warnings, ::testing::Contains(::testing::HasSubstr("smoke does not drift")));
+}
+
 TEST_F(ConfigTest, endings_of_scene_files_may_be_upper_case) {
   for (const std::string name : {"TRUCK.GLB", "truck.Gltf"}) {
     const auto loaded = scenario("[[object]]\ngltf = \"" + name + "\"\n");

@@ -104,6 +104,10 @@ struct DaemonHead {
 [[nodiscard]] const KeyTable<scene::ChannelDetector>& detector_keys();
 [[nodiscard]] const KeyTable<ObjectDraft>& object_keys();
 [[nodiscard]] const KeyTable<scene::ContactDesc>& contact_keys();
+[[nodiscard]] const KeyTable<scene::PlumeDesc>& plume_keys();
+[[nodiscard]] const KeyTable<scene::FlareDesc>& flare_keys();
+[[nodiscard]] const KeyTable<scene::SmokeDesc>& smoke_keys();
+[[nodiscard]] const KeyTable<scene::FireDesc>& fire_keys();
 [[nodiscard]] const KeyTable<InstanceDraft>& instance_keys();
 [[nodiscard]] const KeyTable<KeyframeDraft>& keyframe_keys();
 [[nodiscard]] const KeyTable<PartCommandDraft>& part_command_keys();
@@ -192,6 +196,34 @@ std::optional<std::string> write_array(const std::vector<T>& elements, const Key
 
 /// Numbers as a TOML array.
 [[nodiscard]] std::string toml_vector(const double* values, std::size_t count);
+
+/// A table with one number by name of a band. `List` is a vector of structs with a member `band` and
+/// the number.
+template <class T, class Field, class Value>
+Key<T> band_numbers(std::string name, std::string unit, Range range, Field field, Value value,
+                    std::string meaning) {
+  return custom<T>(
+      {name, "table", std::move(unit), range.to_string(), std::move(meaning), false},
+      [name, range, field, value](T& out, const Node& node, Diagnostics& diagnostics) {
+        if (!expect_table(node, name, diagnostics)) return;
+        for (const Member& member : node.members) {
+          double number = 0.0;
+          read_number(member.value, member.key, range, number, diagnostics);
+          auto& entry = field(out).emplace_back();
+          entry.band = member.key;
+          entry.*value = number;
+        }
+      },
+      [field, value](const T& in) -> std::optional<std::string> {
+        if (field(in).empty()) return std::nullopt;
+        std::string text = "{";
+        for (const auto& entry : field(in)) {
+          text += (text.size() > 1 ? ", " : " ") + toml_string(entry.band) + " = " +
+                  toml_number(entry.*value);
+        }
+        return text + " }";
+      });
+}
 
 /// Three numbers, which are multiplied by `scale` when they are read. Nothing is written where the
 /// field has no value.

@@ -68,29 +68,8 @@ namespace {
 /// Returns the key `band_emissivity_frac` of a struct that has a number per band.
 template <class T>
 Key<T> band_emissivity_key(std::string meaning) {
-  return custom<T>(
-      {"band_emissivity_frac", "table", "", "0 .. 1", std::move(meaning), false},
-      [](T& out, const Node& node, Diagnostics& diagnostics) {
-        if (!expect_table(node, "band_emissivity_frac", diagnostics)) {
-          return;
-        }
-        for (const Member& member : node.members) {
-          double value = 0.0;
-          read_number(member.value, member.key, between(0, 1), value, diagnostics);
-          out.band_emissivity.push_back({member.key, value});
-        }
-      },
-      [](const T& in) -> std::optional<std::string> {
-        if (in.band_emissivity.empty()) {
-          return std::nullopt;
-        }
-        std::string out = "{";
-        for (const scene::BandEmissivity& entry : in.band_emissivity) {
-          out += (out.size() > 1 ? ", " : " ") + toml_string(entry.band) + " = " +
-                 toml_number(entry.emissivity_frac);
-        }
-        return out + " }";
-      });
+  return band_numbers<T>("band_emissivity_frac", "", between(0, 1), EMIT_FIELD(band_emissivity),
+                         &scene::BandEmissivity::emissivity_frac, std::move(meaning));
 }
 
 Key<Material> spread_key() {

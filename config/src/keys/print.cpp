@@ -153,6 +153,18 @@ std::string print_scenario(const scene::ScenarioDesc& scenario) {
   for (const scene::ContactDesc& contact : scenario.contacts) {
     print_section("[[contact]]", contact, contact_keys(), out);
   }
+  for (const auto& plume : scenario.gas.plumes) {
+    print_section("[[plume]]", plume, plume_keys(), out);
+  }
+  for (const auto& flare : scenario.gas.flares) {
+    print_section("[[flare]]", flare, flare_keys(), out);
+  }
+  for (const auto& smoke : scenario.gas.smokes) {
+    print_section("[[smoke]]", smoke, smoke_keys(), out);
+  }
+  for (const auto& fire : scenario.gas.fires) {
+    print_section("[[fire]]", fire, fire_keys(), out);
+  }
   for (const scene::Material& material : scenario.materials) {
     print_section("[[material]]", material, material_keys(), out);
   }

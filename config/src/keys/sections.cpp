@@ -69,6 +69,17 @@ const std::vector<SectionDoc>& scenario_sections() {
                   "three dimensions conducts from body to body; all else ignores the section with "
                   "a warning.",
                   contact_keys(), scene::ContactDesc{}),
+      section_doc("plume", true,
+                  "The exhaust jet of an object ([gas.md](../renderer/docs/gas.md)): a throttle "
+                  "of a part drives it.",
+                  plume_keys(), scene::PlumeDesc{}),
+      section_doc("flare", true,
+                  "A decoy that burns from the instant at which its object appears.", flare_keys(),
+                  scene::FlareDesc{}),
+      section_doc("smoke", true, "A cloud that a source gives off and the wind carries away.",
+                  smoke_keys(), scene::SmokeDesc{}),
+      section_doc("fire", true, "The flame of a fire on the ground or on an object.", fire_keys(),
+                  scene::FireDesc{}),
       section_doc(
           "material", true,
           "A material of the scenario or of a library file, which holds nothing but materials.",

@@ -60,6 +60,12 @@ void check_material_name(const std::string& name, const std::vector<scene::Mater
 [[nodiscard]] std::vector<scene::ContactDesc> resolve_contacts(
     const Node& root, const std::vector<scene::ObjectDesc>& objects,
     const std::vector<scene::Material>& materials, Diagnostics& diagnostics);
+/// Reads plumes, flares, smoke and fires. Reports objects, parts and bands that do not exist, and
+/// more puffs than a frame may hold.
+[[nodiscard]] scene::GasDesc resolve_gas(const Node& root,
+                                         const std::vector<scene::ObjectDesc>& objects,
+                                         const std::vector<std::string>& known_bands,
+                                         Diagnostics& diagnostics);
 [[nodiscard]] scene::SensorDesc resolve_sensor(const Node& root, Diagnostics& diagnostics);
 
 /// Kind of a file by the keys of its first level, see kind_of_file().

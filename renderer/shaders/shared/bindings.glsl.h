@@ -10,11 +10,13 @@
 #define EMIT_BIND_DRAW 4
 #define EMIT_BIND_SHADE 5
 #define EMIT_BIND_TARGETS 6
+#define EMIT_BIND_GAS 7
 
 // Shader storage blocks. Shaders write them.
 #define EMIT_BIND_OUTPUT 0
 #define EMIT_BIND_STATS 1
 #define EMIT_BIND_TARGET_STATS 2
+#define EMIT_BIND_GAS_TILES 3  // read only: there may be more tiles than texels of a buffer texture
 
 // Texture units. A table that every pixel reads at its own index is a buffer texture, because software
 // rasterisers fetch from it much faster than from a storage block.
@@ -43,6 +45,7 @@
 #define EMIT_TEX_TARGET_PLANES 22
 #define EMIT_TEX_TARGET_ROWS 23
 #define EMIT_TEX_INCOMING 24
+#define EMIT_TEX_GAS_PUFFS 25
 
 // Image units.
 #define EMIT_IMG_OCCLUSION 0
@@ -75,6 +78,15 @@
 #define EMIT_MAX_TARGETS 32
 #define EMIT_TARGET_SIDE 128u
 #define EMIT_TARGET_COLUMNS 36u
+
+// Puffs of gas of a frame, vectors of 128 bits with one bit per puff, pixels along the side of a tile that one work group
+// draws, kinds of puffs, and a boresight distance that stands for no surface.
+#define EMIT_MAX_GAS_PUFFS 256
+#define EMIT_GAS_PUFF_BITS 2
+#define EMIT_GAS_TILE 16u
+#define EMIT_GAS_SMALL 1u  // the image of the puff is a few pixels wide
+#define EMIT_GAS_FLARE 2u  // it emits and absorbs nothing
+#define EMIT_GAS_FAR_M 1e7f
 
 // Boresight distance that the geometry buffer holds for a pixel without a surface.
 #define EMIT_SKY_DEPTH_M 1e30f

@@ -7,6 +7,7 @@ namespace emit::tool {
 
 void add_bench_budget(CommandLine& bench);
 void add_bench_crowd(CommandLine& bench);
+void add_bench_gas(CommandLine& bench);
 void add_bench_live(CommandLine& bench);
 void add_bench_paper(CommandLine& bench);
 void add_bench_scaling(CommandLine& bench);

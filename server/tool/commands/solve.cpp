@@ -352,6 +352,7 @@ int run(const SolveOptions& command) {
   scene::adopt_sheets(*geometry);
   for (const std::string& text : scenario->warnings) warn(text);
   for (const std::string& text : geometry->warnings) warn(text);
+  if (!scenario->gas.empty()) warn("plumes, flares, smoke and fires are not drawn by emit solve");
   std::optional<tbb::global_control> threads;
   if (command.threads > 0) {
     threads.emplace(tbb::global_control::max_allowed_parallelism,

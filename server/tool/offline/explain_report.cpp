@@ -64,10 +64,16 @@ std::string history_text(const ProbeRun& history) {
 }
 
 /// Cells of a band's table: name, radiance and share of each term, then sum and pixel.
+/// True if gas lies before the surface or the sky of a pixel.
+bool has_gas(const renderer::RadianceTerms& terms) {
+  return terms.gas_frac != 1.0 || terms.gas_w_m2_sr != 0.0;
+}
+
 std::vector<std::vector<std::string>> term_rows(const ExplainedBand& band) {
   std::vector<std::vector<std::string>> out;
   const double sum = band.terms.sum_w_m2_sr();
   for (const auto& [name, value] : named_terms(band.terms)) {
+    if (name == "gas" && !has_gas(band.terms)) continue;
     out.push_back({std::string(name), fmt::format("{:.6g}", value),
                    fmt::format("{:.2f} %", sum != 0.0 ? 100.0 * value / sum : 0.0)});
   }
@@ -88,11 +94,14 @@ std::string surface_sentence(const Explanation& found) {
 }
 
 std::string air_sentence(const Explanation& found, const ExplainedBand& band) {
-  if (!found.surface) return fmt::format("Apparent temperature {:.3f} K.", band.apparent_k);
+  const std::string gas =
+      has_gas(band.terms) ? fmt::format(" Gas lets {:.4f} through.", band.terms.gas_frac) : "";
+  if (!found.surface) return fmt::format("Apparent temperature {:.3f} K.{}", band.apparent_k, gas);
   return fmt::format(
       "Apparent temperature {:.3f} K, emissivity {:.4f}, air lets {:.4f} through (sunlight "
-      "{:.4f}).",
-      band.apparent_k, band.terms.emissivity_frac, band.terms.air_frac, band.terms.air_sun_frac);
+      "{:.4f}).{}",
+      band.apparent_k, band.terms.emissivity_frac, band.terms.air_frac, band.terms.air_sun_frac,
+      gas);
 }
 
 std::string headline(const Explanation& found) {
@@ -103,13 +112,14 @@ std::string headline(const Explanation& found) {
 
 }  // namespace
 
-std::array<std::pair<std::string_view, double>, 5> named_terms(
+std::array<std::pair<std::string_view, double>, 6> named_terms(
     const renderer::RadianceTerms& terms) {
   return {{{"emission", terms.emission_w_m2_sr},
            {"reflected sky", terms.sky_w_m2_sr},
            {"reflected neighbours", terms.neighbours_w_m2_sr},
            {"reflected sun", terms.sun_w_m2_sr},
-           {"path", terms.path_w_m2_sr}}};
+           {"path", terms.path_w_m2_sr},
+           {"gas", terms.gas_w_m2_sr}}};
 }
 
 std::string explain_text(const Explanation& found) {
@@ -152,12 +162,13 @@ Json explain_json(const Explanation& found) {
     Json terms = Json::object();
     terms.set("emission_w_m2_sr", t.emission_w_m2_sr).set("sky_w_m2_sr", t.sky_w_m2_sr);
     terms.set("neighbours_w_m2_sr", t.neighbours_w_m2_sr).set("sun_w_m2_sr", t.sun_w_m2_sr);
-    terms.set("path_w_m2_sr", t.path_w_m2_sr);
+    terms.set("path_w_m2_sr", t.path_w_m2_sr).set("gas_w_m2_sr", t.gas_w_m2_sr);
     Json json = Json::object();
     json.set("band", band.name).set("pixel_w_m2_sr", band.pixel_w_m2_sr);
     json.set("sum_w_m2_sr", t.sum_w_m2_sr()).set("terms", terms);
     json.set("apparent_k", band.apparent_k).set("emissivity_frac", t.emissivity_frac);
     json.set("air_frac", t.air_frac).set("air_sun_frac", t.air_sun_frac);
+    json.set("gas_frac", t.gas_frac);
     bands.push(json);
   }
   out.set("bands", bands);

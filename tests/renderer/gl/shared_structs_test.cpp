@@ -8,6 +8,7 @@
 #include "gl/program.hpp"
 #include "shared/frame_params.glsl.h"
 #include "shared/shade_params.glsl.h"
+#include "shared/gas_params.glsl.h"
 #include "shared/target_params.glsl.h"
 
 namespace emit::renderer {
@@ -50,6 +51,12 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   auto target_rows = gl::Program::compute("passes/target_rows.comp", planes);
   ASSERT_TRUE(target_rows) << target_rows.error().text;
 
+  auto gas = gl::Program::compute("passes/gas.comp", std::vector<gl::Define>{{"EMIT_BANDS", "4"}});
+  ASSERT_TRUE(gas) << gas.error().text;
+  EXPECT_OFFSET(*gas, "image", gpu::GasImage, px_per_tan);
+  EXPECT_OFFSET(*gas, "image", gpu::GasImage, window_px);
+  EXPECT_OFFSET(*gas, "image", gpu::GasImage, near_m);
+  EXPECT_OFFSET(*gas, "image", gpu::GasImage, term_frac[1]);
   EXPECT_OFFSET(*targets, "targets", gpu::TargetsParams, targets[1].place_px);
   EXPECT_OFFSET(*targets, "targets", gpu::TargetsParams, targets[1].origin);
   EXPECT_OFFSET(*targets, "targets", gpu::TargetsParams, targets[1].per_px);

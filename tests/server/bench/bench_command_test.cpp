@@ -92,6 +92,21 @@ TEST(CliBench, ACrowdIsMeasuredBesideTheSceneWithoutIt) {
   EXPECT_EQ(numbers_of(json, "frame_ms_median").size(), 2U);
 }
 
+TEST(CliBench, GasIsMeasuredBesideTheSceneWithoutIt) {
+  const TemporaryFolder folder;
+  const ProcessResult run = run_emit({"bench", "gas", "--pairs", "15", "--set",
+                                      "thermal.tolerance_k=50", "--set", "thermal.steps=3", "--set",
+                                      "thermal.history_start_s=-600", "--set", "sensor.width_px=64",
+                                      "--set", "sensor.height_px=48", "--json",
+                                      folder.file("g.json")});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const std::string json = read_text(folder.file("g.json"));
+  EXPECT_EQ(json_value(json, "suite"), "\"gas\"");
+  EXPECT_EQ(numbers_of(json, "puffs"), (std::vector<double>{0, 20, 4, 144, 12, 180}));
+  EXPECT_EQ(numbers_of(json, "ratio").size(), 6U);
+  for (const double ms : numbers_of(json, "frame_ms_median")) EXPECT_GT(ms, 0.0);
+}
+
 TEST(CliBench, LossyStreamsSayWhatCameAndNothingOfItIsWrong) {
   const TemporaryFolder folder;
   const ProcessResult run =

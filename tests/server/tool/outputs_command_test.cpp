@@ -93,6 +93,7 @@ const std::vector<OutputCase>& output_cases() {
     add({"bench", "thermal-truth"}, {"--json"}, {"--pictures"});
     add({"bench", "scaling"}, {"--json"});
     add({"bench", "crowd"}, {"--json"});
+    add({"bench", "gas"}, {"--json"});
     add({"bench", "turn"}, {"--json"});
     add({"bench", "live"}, {"--json"});
     add({"bench", "budget"}, {"--json"});

@@ -14,6 +14,7 @@
 #include "emit/physics/frames.hpp"
 #include "emit/physics/weather.hpp"
 #include "emit/scene/channel_output.hpp"
+#include "emit/scene/gas_desc.hpp"
 
 /// Plain description of a scenario. `config` fills it from files, `renderer` and `reference` read
 /// it; it holds no loaded geometry and no GPU or parser types. All values SI, angles in radians.
@@ -373,6 +374,7 @@ struct ScenarioDesc {
   std::string default_material;     ///< for glTF materials that nothing maps
   std::vector<ObjectDesc> objects;
   std::vector<ContactDesc> contacts;  ///< only the reference solution in three dimensions has them
+  GasDesc gas;                        ///< part of the picture alone
   SensorDesc sensor;
   std::vector<ChannelDesc> channels;
   ThermalOptions thermal;
