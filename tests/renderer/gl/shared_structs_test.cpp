@@ -56,7 +56,7 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   EXPECT_OFFSET(*gas, "image", gpu::GasImage, px_per_tan);
   EXPECT_OFFSET(*gas, "image", gpu::GasImage, window_px);
   EXPECT_OFFSET(*gas, "image", gpu::GasImage, near_m);
-  EXPECT_OFFSET(*gas, "image", gpu::GasImage, term_frac[1]);
+  EXPECT_OFFSET(*gas, "image", gpu::GasImage, term_frac[0]);
   EXPECT_OFFSET(*targets, "targets", gpu::TargetsParams, targets[1].place_px);
   EXPECT_OFFSET(*targets, "targets", gpu::TargetsParams, targets[1].origin);
   EXPECT_OFFSET(*targets, "targets", gpu::TargetsParams, targets[1].per_px);
