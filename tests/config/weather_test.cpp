@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "config/config_support.hpp"
+#include "emit/physics/evaporation.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/physics/weather.hpp"
 

@@ -10,6 +10,7 @@
 
 #include "config/config_support.hpp"
 #include "emit/physics/constants.hpp"
+#include "emit/physics/evaporation.hpp"
 #include "emit/physics/sun.hpp"
 #include "tables/weather_year.hpp"
 
