@@ -15,8 +15,7 @@ bool same_weather(const physics::WeatherSample& a, const physics::WeatherSample&
          a.longwave_down_w_m2 == b.longwave_down_w_m2 && a.air_k == b.air_k &&
          a.wind_m_s == b.wind_m_s && a.cloud_frac == b.cloud_frac &&
          a.environment_k == b.environment_k && a.film_w_m2_k == b.film_w_m2_k &&
-         a.wind_from_rad == b.wind_from_rad &&
-         a.relative_humidity_frac == b.relative_humidity_frac;
+         a.wind_from_rad == b.wind_from_rad && a.relative_humidity_frac == b.relative_humidity_frac;
 }
 
 }  // namespace
@@ -87,9 +86,9 @@ physics::Forcing Environment::forcing_at(std::int64_t sim_time_ns,
   if (after == live_.begin() && table_.empty()) {
     return physics::forcing_from_clear_sky(clear_sky_, place_, sun, epoch_utc_ns_ + sim_time_ns);
   }
-  const physics::Forcing forcing =
-      after != live_.begin() ? physics::forcing_from_rows({&*(after - 1), 1}, sim_time_ns)
-                             : physics::forcing_from_rows(table_, sim_time_ns);
+  const physics::Forcing forcing = after != live_.begin()
+                                       ? physics::forcing_from_rows({&*(after - 1), 1}, sim_time_ns)
+                                       : physics::forcing_from_rows(table_, sim_time_ns);
   return physics::with_vapour(physics::at_place(forcing, place_, sun), usual_dew_point_k_);
 }
 

@@ -93,8 +93,7 @@ void fit_changes(HistoryInterval& interval, const Environment& environment) noex
         &physics::Forcing::environment_k, &physics::Forcing::stated_film_w_m2_k,
         &physics::Forcing::stated_film_frac, &physics::Forcing::wind_m_s,
         &physics::Forcing::wind_to_east, &physics::Forcing::wind_to_north,
-        &physics::Forcing::gust_m_s, &physics::Forcing::cloud_frac,
-        &physics::Forcing::vapour_pa}) {
+        &physics::Forcing::gust_m_s, &physics::Forcing::cloud_frac, &physics::Forcing::vapour_pa}) {
     double mean = 0.0;
     double moment = 0.0;
     double low = parts[0].*value;
@@ -152,12 +151,11 @@ FosterDrive<double> unshadowed_drive(const SurfaceForcing& f, const FosterMateri
   const double short_wave_w_m2 = std::max(0.0, glm::dot(normal, f.sun_w_m2)) +
                                  sky_frac * f.diffuse_w_m2 + (1.0 - sky_frac) * f.reflected_w_m2;
   const double long_wave_w_m2 = sky_frac * f.longwave_w_m2 + (1.0 - sky_frac) * f.environment_w_m2;
-  FosterDrive<double> drive{
-      .absorbed_w_m2 = material.solar_absorptance_frac * short_wave_w_m2 +
-                       material.emissivity_frac * long_wave_w_m2,
-      .film_w_m2_k = physics::film_w_m2_k(f.film, normal, material.roughness,
-                                          reference_k + offset_k - f.air_k),
-      .air_offset_k = f.air_k - reference_k};
+  FosterDrive<double> drive{.absorbed_w_m2 = material.solar_absorptance_frac * short_wave_w_m2 +
+                                             material.emissivity_frac * long_wave_w_m2,
+                            .film_w_m2_k = physics::film_w_m2_k(f.film, normal, material.roughness,
+                                                                reference_k + offset_k - f.air_k),
+                            .air_offset_k = f.air_k - reference_k};
   physics::add_moisture(material.moisture, f.moist, short_wave_w_m2, drive);
   return drive;
 }

@@ -241,8 +241,7 @@ bool complete_weather(std::string_view name, const StatedClearSky& stated,
   scenario.clear_sky =
       fitted(std::span(rows.begin(), first_day_end), sky, stated, scenario.clear_sky);
   // The made weather keeps the vapour of the table's first day, as far as its air can hold it.
-  const std::optional<double> vapour_pa =
-      mean_vapour_pa(std::span(rows.begin(), first_day_end));
+  const std::optional<double> vapour_pa = mean_vapour_pa(std::span(rows.begin(), first_day_end));
   std::vector<WeatherSample> made;
   const std::int64_t step_ns = first_ns - from_ns > kLongFillNs ? kLongFillStepNs : kFillStepNs;
   // The weather passes into the table over the last, shorter step.

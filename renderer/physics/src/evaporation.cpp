@@ -6,10 +6,10 @@
 namespace emit::physics {
 namespace {
 
-constexpr double kHeatJKgK = 1013.0;      // of moist air, FAO-56
-constexpr double kGasJKgK = 287.05;       // of dry air
-constexpr double kVapourRatio = 0.622;    // molar mass of water over that of dry air
-constexpr double kLatentJKg = 2.501e6;    // at 0 C
+constexpr double kHeatJKgK = 1013.0;    // of moist air, FAO-56
+constexpr double kGasJKgK = 287.05;     // of dry air
+constexpr double kVapourRatio = 0.622;  // molar mass of water over that of dry air
+constexpr double kLatentJKg = 2.501e6;  // at 0 C
 constexpr double kLatentFallJKgK = 2361.0;
 
 }  // namespace

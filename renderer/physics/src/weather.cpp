@@ -81,10 +81,8 @@ Forcing forcing_from_rows(std::span<const WeatherSample> rows, std::int64_t sim_
 }
 
 Forcing with_vapour(Forcing forcing, double usual_dew_point_k) noexcept {
-  const double usual_pa =
-      saturation_over_water_pa(std::min(usual_dew_point_k, forcing.air_k));
-  forcing.vapour_pa =
-      forcing.stated_vapour_pa + (1.0 - forcing.stated_vapour_frac) * usual_pa;
+  const double usual_pa = saturation_over_water_pa(std::min(usual_dew_point_k, forcing.air_k));
+  forcing.vapour_pa = forcing.stated_vapour_pa + (1.0 - forcing.stated_vapour_frac) * usual_pa;
   return forcing;
 }
 

@@ -164,10 +164,9 @@ FaceState face_of(const FosterDrive<double>& drive,
 void run_reference(LayerSolver& solver, double emissivity_frac, FitHistory& history) {
   for (FitStep& step : history.steps) {
     const double begin_s = solver.time_s();
-    solver.advance(
-        FaceSegment{begin_s, begin_s + step.dt_s, face_of(step.begin, step.begin_water),
-                    face_of(step.end, step.end_water)},
-        emissivity_frac);
+    solver.advance(FaceSegment{begin_s, begin_s + step.dt_s, face_of(step.begin, step.begin_water),
+                               face_of(step.end, step.end_water)},
+                   emissivity_frac);
     step.truth_k = solver.face_k();
   }
 }

@@ -59,8 +59,7 @@ void add_latent(const ClimateNode& now, const physics::MoistSurface& moisture,
   const double slope_w_m2_k =
       (latent_w_m2(face_k + kDifferenceK) - latent_w_m2(face_k - kDifferenceK)) /
       (2.0 * kDifferenceK);
-  const double into_w_m2 =
-      film_w_m2_k * air_k + slope_w_m2_k * face_k - latent_w_m2(face_k);
+  const double into_w_m2 = film_w_m2_k * air_k + slope_w_m2_k * face_k - latent_w_m2(face_k);
   film_w_m2_k += slope_w_m2_k;
   air_k = into_w_m2 / film_w_m2_k;
 }

@@ -151,24 +151,26 @@ void MaterialLookup::warn_of_moisture() {
                                     fmt::join(moist, "', '"), moist.size() == 1 ? "s" : "", text));
   };
   if (scenario_->thermal.model == ThermalModel::emit2014) {
-    warn("which emit2014 leaves out: temperatures are those of dry layers, too warm by 5 to 30 K "
-         "by day");
+    warn(
+        "which emit2014 leaves out: temperatures are those of dry layers, too warm by 5 to 30 K "
+        "by day");
     return;
   }
   if (!wet.empty()) {
-    warnings_.push_back(fmt::format("{}: '{}' stay{} as wet as stated over the whole run: drying "
-                                    "is not modelled",
-                                    scenario_->file.string(), fmt::join(wet, "', '"),
-                                    wet.size() == 1 ? "s" : ""));
+    warnings_.push_back(
+        fmt::format("{}: '{}' stay{} as wet as stated over the whole run: drying "
+                    "is not modelled",
+                    scenario_->file.string(), fmt::join(wet, "', '"), wet.size() == 1 ? "s" : ""));
   }
   // The history is what matters, from its start to a day of frames.
   const std::vector<physics::WeatherSample>& rows = scenario_->weather;
   if (!rows.empty() && std::ranges::any_of(rows, [](const physics::WeatherSample& row) {
         return !row.relative_humidity_frac;
       })) {
-    warn(fmt::format("but weather does not state the humidity (relative_humidity_frac) in every "
-                     "row: a dew point of {:.1f} K counts there, that of 60 % at the mean air",
-                     usual_dew_point_k(*scenario_)));
+    warn(
+        fmt::format("but weather does not state the humidity (relative_humidity_frac) in every "
+                    "row: a dew point of {:.1f} K counts there, that of 60 % at the mean air",
+                    usual_dew_point_k(*scenario_)));
   }
   double coldest_k = scenario_->clear_sky.air_mean_k - scenario_->clear_sky.air_amplitude_k;
   if (!rows.empty()) {
@@ -181,10 +183,11 @@ void MaterialLookup::warn_of_moisture() {
     }
   }
   if (coldest_k < physics::kZeroCelsiusK) {
-    warn(fmt::format("and the air goes down to {:.1f} K: below 273.15 K ice takes the place of "
-                     "water, but neither freezing nor melting nor the rest of plants in winter is "
-                     "modelled",
-                     coldest_k));
+    warn(
+        fmt::format("and the air goes down to {:.1f} K: below 273.15 K ice takes the place of "
+                    "water, but neither freezing nor melting nor the rest of plants in winter is "
+                    "modelled",
+                    coldest_k));
   }
 }
 

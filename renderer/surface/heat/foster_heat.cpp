@@ -471,10 +471,9 @@ void FosterHeat::step_response(std::uint32_t material, const ResponseConditions&
   const double t = around.surface_k;
   FosterDrive<double> moist{.film_w_m2_k = around.film_w_m2_k};
   physics::add_moisture(m.moisture, around.moist, physics::kOpenStomataWM2, moist);
-  const double h_w_m2_k =
-      around.film_w_m2_k +
-      4.0 * m.emissivity_frac * physics::kStefanBoltzmannWPerM2K4 * t * t * t +
-      physics::latent_flux(t, moist).slope_w_m2_k;
+  const double h_w_m2_k = around.film_w_m2_k +
+                          4.0 * m.emissivity_frac * physics::kStefanBoltzmannWPerM2K4 * t * t * t +
+                          physics::latent_flux(t, moist).slope_w_m2_k;
   // Integrate tau x' = r q - x with q = 1 - h sum x by implicit steps: they are stable for any
   // ratio of step and time constant.
   constexpr int kParts = 16;

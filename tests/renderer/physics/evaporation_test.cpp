@@ -117,8 +117,8 @@ TEST(Evaporation, WetAdiabaticSurfaceTakesTheWetBulbTemperature) {
   for (const Row& row : {Row{10.0, 0.5, 5.5}, Row{20.0, 0.5, 13.8}, Row{25.0, 0.5, 17.9},
                          Row{30.0, 0.5, 22.0}, Row{20.0, 1.0, 20.0}}) {
     const double air_k = kZero + row.air_c;
-    const MoistAir air = moist_air(
-        air_k, 101'325.0, row.humidity_frac * saturation_over_water_pa(air_k));
+    const MoistAir air =
+        moist_air(air_k, 101'325.0, row.humidity_frac * saturation_over_water_pa(air_k));
     for (const double film_w_m2_k : {5.0, 20.0, 80.0}) {
       const double k =
           steady_k(drive_of(air_k, film_w_m2_k, 0.0, air, {.wetness_frac = 1.0}), 1e-12);
@@ -127,9 +127,8 @@ TEST(Evaporation, WetAdiabaticSurfaceTakesTheWetBulbTemperature) {
   }
   // FAO-56 example 4: 25.6 C dry, 19.5 C wet at 1200 m (87.9 kPa) is a vapour pressure of 1.91 kPa.
   const double air_k = kZero + 25.6;
-  const double k = steady_k(drive_of(air_k, 20.0, 0.0, moist_air(air_k, 87'900.0, 1910.0),
-                                     {.wetness_frac = 1.0}),
-                            1e-12);
+  const double k = steady_k(
+      drive_of(air_k, 20.0, 0.0, moist_air(air_k, 87'900.0, 1910.0), {.wetness_frac = 1.0}), 1e-12);
   EXPECT_NEAR(k - kZero, 19.5, 0.1);
 }
 
@@ -153,12 +152,11 @@ TEST(Evaporation, SteadySurfaceEvaporatesAsPenmanAndMonteith) {
         for (const double film_w_m2_k : {10.0, 20.0, 40.0}) {
           for (const double sun_w_m2 : {0.0, 200.0, 500.0, 800.0}) {
             const double air_k = kZero + air_c;
-            const MoistAir air = moist_air(
-                air_k, 101'325.0, humidity_frac * saturation_over_water_pa(air_k));
+            const MoistAir air =
+                moist_air(air_k, 101'325.0, humidity_frac * saturation_over_water_pa(air_k));
             const double sky_w_m2 = 0.8 * kStefanBoltzmannWPerM2K4 * std::pow(air_k, 4.0);
-            const auto drive =
-                drive_of(air_k, film_w_m2_k, 0.77 * sun_w_m2 + sky_w_m2, air,
-                         {.wetness_frac = 1.0, .resistance_s_m = resistance_s_m});
+            const auto drive = drive_of(air_k, film_w_m2_k, 0.77 * sun_w_m2 + sky_w_m2, air,
+                                        {.wetness_frac = 1.0, .resistance_s_m = resistance_s_m});
             const double k = steady_k(drive, 1.0);
             const double latent_w_m2 = latent_flux(k, drive).flux_w_m2;
             const double net_w_m2 =
@@ -168,13 +166,12 @@ TEST(Evaporation, SteadySurfaceEvaporatesAsPenmanAndMonteith) {
             const double chord_pa_k = std::abs(k - air_k) > 1e-3
                                           ? (saturation(k).pressure_pa - air_pa) / (k - air_k)
                                           : saturation(air_k).slope_pa_k;
-            const double chord_w_m2 = penman_monteith_w_m2(net_w_m2, air_k, air, film_w_m2_k,
-                                                           resistance_s_m, chord_pa_k);
+            const double chord_w_m2 =
+                penman_monteith_w_m2(net_w_m2, air_k, air, film_w_m2_k, resistance_s_m, chord_pa_k);
             EXPECT_NEAR(latent_w_m2, chord_w_m2, 0.05 + 1e-3 * std::abs(chord_w_m2));
             // FAO-56 takes the slope at the air.
-            const double closed_w_m2 =
-                penman_monteith_w_m2(net_w_m2, air_k, air, film_w_m2_k, resistance_s_m,
-                                     saturation(air_k).slope_pa_k);
+            const double closed_w_m2 = penman_monteith_w_m2(
+                net_w_m2, air_k, air, film_w_m2_k, resistance_s_m, saturation(air_k).slope_pa_k);
             if (latent_w_m2 < 0.0) continue;  // dew, which has no resistance
             ++cases;
             worst_frac = std::max(worst_frac, std::abs(latent_w_m2 - chord_w_m2) / chord_w_m2);
@@ -199,16 +196,15 @@ TEST(Evaporation, ReferenceGrassEvaporatesAsInTheExamplesOfFao56) {
   struct Example {
     double air_c;
     double vapour_kpa;
-    double wind_m_s;      ///< at 2 m: the aerodynamic resistance is 208 s/m over it
-    double net_mj_m2_h;   ///< net radiation less heat into the ground
+    double wind_m_s;     ///< at 2 m: the aerodynamic resistance is 208 s/m over it
+    double net_mj_m2_h;  ///< net radiation less heat into the ground
     double pressure_kpa;
     double expected_mm_h;
   };
   // Example 18 (Uccle, 6 July, by the day: 16.9 C, 2.78 m/s at 10 m) and example 19 (N'Diaye, 1
   // October, 14 to 15 h).
-  for (const Example& e :
-       {Example{16.9, 1.409, 2.078, 13.28 / 24.0, 100.1, 3.88 / 24.0},
-        Example{38.0, 3.445, 3.3, 1.749 - 0.175, 101.2, 0.63}}) {
+  for (const Example& e : {Example{16.9, 1.409, 2.078, 13.28 / 24.0, 100.1, 3.88 / 24.0},
+                           Example{38.0, 3.445, 3.3, 1.749 - 0.175, 101.2, 0.63}}) {
     const double air_k = kZero + e.air_c;
     const MoistAir air = moist_air(air_k, 1e3 * e.pressure_kpa, 1e3 * e.vapour_kpa);
     const double film_w_m2_k = air.heat_j_m3_k * e.wind_m_s / 208.0;
@@ -223,8 +219,8 @@ TEST(Evaporation, ReferenceGrassEvaporatesAsInTheExamplesOfFao56) {
 }
 
 TEST(Evaporation, StomataCloseWithoutLightAndDewNeedsNone) {
-  const MoistSurface grass{.wetness_frac = 1.0, .resistance_s_m = 70.0,
-                           .night_resistance_s_m = 200.0};
+  const MoistSurface grass{
+      .wetness_frac = 1.0, .resistance_s_m = 70.0, .night_resistance_s_m = 200.0};
   EXPECT_DOUBLE_EQ(surface_resistance_s_m(grass, 0.0), 200.0);
   EXPECT_DOUBLE_EQ(surface_resistance_s_m(grass, kOpenStomataWM2), 70.0);
   EXPECT_DOUBLE_EQ(surface_resistance_s_m(grass, 900.0), 70.0);
@@ -268,16 +264,15 @@ Extreme extreme(std::mt19937& random) {
   out.network.count = 2;
   out.surface = foster_surface(out.network, between(0.1, 1.0), between(250.0, 320.0), kReferenceK);
   const double start_k = between(230.0, 370.0);
-  out.x = foster_steady((start_k - kReferenceK - out.surface.base_offset_k) /
-                            out.network.resistance_m2k_w(),
-                        out.surface);
+  out.x = foster_steady(
+      (start_k - kReferenceK - out.surface.base_offset_k) / out.network.resistance_m2k_w(),
+      out.surface);
   const MoistSurface moisture{.wetness_frac = between(0.1, 1.0),
                               .resistance_s_m = std::max(0.0, between(-100.0, 300.0))};
   const double air_k = between(230.0, 320.0);
-  out.begin = drive_of(air_k, between(1.0, 100.0), between(100.0, 1500.0),
-                       moist_air(air_k, 101'325.0,
-                                 between(0.0, 1.0) * saturation_over_water_pa(air_k)),
-                       moisture);
+  out.begin = drive_of(
+      air_k, between(1.0, 100.0), between(100.0, 1500.0),
+      moist_air(air_k, 101'325.0, between(0.0, 1.0) * saturation_over_water_pa(air_k)), moisture);
   out.end = out.begin;
   out.dt_s = std::pow(10.0, between(-1.0, 6.0));
   return out;

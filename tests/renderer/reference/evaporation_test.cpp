@@ -84,8 +84,7 @@ struct Courses {
 };
 
 Courses courses_of(const scene::ScenarioDesc& scenario, const scene::Material& desc,
-                   const reference::SurfaceClimate& climate,
-                   std::span<const std::int64_t> nodes_ns,
+                   const reference::SurfaceClimate& climate, std::span<const std::int64_t> nodes_ns,
                    std::span<const renderer::IntervalForcing> forcing) {
   Courses out;
   const glm::dvec3 up(0.0, 0.0, 1.0);
@@ -190,9 +189,9 @@ TEST(ReferenceEvaporation, LawnAtNoonIsNearTheAirAndNotNearItsDryLayers) {
     parched.wetness_frac = 0.0;
     const double wet_k =
         courses_of(scenario, *material, *climate, nodes_ns, *forcing).model_k.back();
-    const double dry_k =
-        courses_of(scenario, parched, *climate, nodes_ns, *forcing).model_k.back();
-    std::printf("%s at noon: %.2f K, as dry layers %.2f K, air %.2f K\n", name, wet_k, dry_k, air_k);
+    const double dry_k = courses_of(scenario, parched, *climate, nodes_ns, *forcing).model_k.back();
+    std::printf("%s at noon: %.2f K, as dry layers %.2f K, air %.2f K\n", name, wet_k, dry_k,
+                air_k);
     // Grass that is short of no water is at most some ten kelvins above the air.
     EXPECT_LT(wet_k - air_k, 10.0) << name;
     EXPECT_GT(dry_k - wet_k, 5.0) << name;

@@ -51,10 +51,10 @@ struct FosterMaterial {
   double base_k = 0.0;
   double initial_k = 0.0;
   double prescribed_k = 0.0;
-  double roughness = 1.0;  ///< factor of the forced part of the film (physics.md eq. 34)
+  double roughness = 1.0;          ///< factor of the forced part of the film (physics.md eq. 34)
   physics::MoistSurface moisture;  ///< exchange of water with the air
-  bool sheet = false;      ///< driven by the mean of the fluxes that its two faces receive
-  bool body = false;       ///< the base is the interior of a body, which starts at base_k
+  bool sheet = false;              ///< driven by the mean of the fluxes that its two faces receive
+  bool body = false;               ///< the base is the interior of a body, which starts at base_k
   /// Layers in which heat moves sideways; empty for sheets and for prescribed temperatures.
   std::vector<physics::StackLayer> layers;
   physics::FosterState<double> base_shares{};  ///< shares c_i of the modes in a change of the base

@@ -41,11 +41,11 @@ struct BalanceFace {
       const double air_k = mix(a.air_k, b.air_k);
       const double sensible_w_m2 = h_w_m2_k * (air_k - k);
       if (!a.moisture || !b.moisture || !(h_w_m2_k > 0.0)) return sensible_w_m2;
-      const FaceMoisture now{.vapour_pa = mix(a.moisture->vapour_pa, b.moisture->vapour_pa),
-                             .pressure_pa = mix(a.moisture->pressure_pa, b.moisture->pressure_pa),
-                             .wetness_frac = a.moisture->wetness_frac,
-                             .resistance_s_m =
-                                 mix(a.moisture->resistance_s_m, b.moisture->resistance_s_m)};
+      const FaceMoisture now{
+          .vapour_pa = mix(a.moisture->vapour_pa, b.moisture->vapour_pa),
+          .pressure_pa = mix(a.moisture->pressure_pa, b.moisture->pressure_pa),
+          .wetness_frac = a.moisture->wetness_frac,
+          .resistance_s_m = mix(a.moisture->resistance_s_m, b.moisture->resistance_s_m)};
       return sensible_w_m2 - now.latent_w_m2(k, air_k, h_w_m2_k);
     };
     // Take the slope of what follows the temperature by differences.
@@ -111,10 +111,10 @@ double saturation_pa(double temperature_k) noexcept {
   const double v = 1.0 - t / kCriticalK;
   const double root = std::sqrt(v);
   const double cube = v * v * v;
-  return kCriticalPa *
-         std::exp(kCriticalK / t *
-                  (-7.85951783 * v + 1.84408259 * v * root - 11.7866497 * cube +
-                   22.6807411 * cube * root - 15.9618719 * cube * v + 1.80122502 * cube * cube * v * root));
+  return kCriticalPa * std::exp(kCriticalK / t *
+                                (-7.85951783 * v + 1.84408259 * v * root - 11.7866497 * cube +
+                                 22.6807411 * cube * root - 15.9618719 * cube * v +
+                                 1.80122502 * cube * cube * v * root));
 }
 
 double FaceMoisture::latent_w_m2(double face_k, double air_k, double film_w_m2_k) const noexcept {

@@ -136,8 +136,11 @@ void PointSolver::run(const glm::dvec3& normal, const Views& views,
     std::fill(out_k.begin(), out_k.end(), *material_->prescribed_k);
     return;
   }
-  const SurfaceOptics surface{normal, material_->solar_absorptance_frac, material_->emissivity_frac,
-                              scene::roughness_factor(material_->roughness), material_->sheet,
+  const SurfaceOptics surface{normal,
+                              material_->solar_absorptance_frac,
+                              material_->emissivity_frac,
+                              scene::roughness_factor(material_->roughness),
+                              material_->sheet,
                               scene::moisture_of(*material_)};
   // Repeat the spin-up only for another orientation.
   if (!has_spin_up_ || normal != spin_up_normal_) spin_up(surface);

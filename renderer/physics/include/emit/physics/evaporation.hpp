@@ -27,8 +27,8 @@ struct MoistAir {
 
 /// How a surface gives water to the air. A wetness of 0 is a dry surface.
 struct MoistSurface {
-  double wetness_frac = 0.0;     ///< share of the rate of a surface that is moist all over, 0..1
-  double resistance_s_m = 0.0;   ///< between the water and the air at the surface, in sunlight
+  double wetness_frac = 0.0;    ///< share of the rate of a surface that is moist all over, 0..1
+  double resistance_s_m = 0.0;  ///< between the water and the air at the surface, in sunlight
   double night_resistance_s_m = 0.0;  ///< the same without sunlight; not below resistance_s_m
 
   [[nodiscard]] bool dry() const noexcept { return !(wetness_frac > 0.0); }

@@ -212,8 +212,7 @@ Mask<Real> foster_step(FosterState<Real>& x, const FosterDrive<Real>& begin,
   const SurfaceBalance<Real> balance{
       s.emission_w_m2_k4, end.film_w_m2_k + conductance + latent.slope_w_m2_k,
       end.absorbed_w_m2 + end.film_w_m2_k * (s.reference_k + end.air_offset_k) +
-          conductance * (s.reference_k + p_k) +
-          (latent.slope_w_m2_k * begin_k - latent.flux_w_m2)};
+          conductance * (s.reference_k + p_k) + (latent.slope_w_m2_k * begin_k - latent.flux_w_m2)};
   const EquilibriumResult<Real> root = solve_equilibrium(balance);
   // Take one Newton step on offsets. A temperature in kelvin resolves only 3e-5 K in float32, which
   // a short step (small R) would turn into a wrong flux. The step also leads from the tangent of
