@@ -324,7 +324,8 @@ const std::vector<Case>& cases() {
        "s.toml:7:24: 'night_resistance_s_m' needs 'surface_resistance_s_m'"},
       {"night_below_day",
        material("base_k = 290\nsurface_resistance_s_m = 70\nnight_resistance_s_m = 50\n" + kLayer),
-       "s.toml:8:24: 'night_resistance_s_m' (50) is below 'surface_resistance_s_m' (70): stomata "
+       "s.toml:8:24: 'night_resistance_s_m' (50.0) is below 'surface_resistance_s_m' (70.0): "
+       "stomata "
        "close at night"},
       {"night_of_open_water",
        material("base_k = 290\nsurface_resistance_s_m = 0\nnight_resistance_s_m = 50\n" + kLayer),

@@ -119,7 +119,9 @@ TEST_F(ConfigTest, the_shipped_library_is_complete_and_consistent) {
                        material.name.ends_with("_wet");
     EXPECT_EQ(moist, !scene::moisture_of(material).dry()) << material.name;
     EXPECT_TRUE(!stirred || !material.dry_layers_valid) << material.name;
-    if (moist) EXPECT_FALSE(material.uncertainty.empty()) << material.name;
+    if (moist) {
+      EXPECT_FALSE(material.uncertainty.empty()) << material.name;
+    }
   }
 }
 

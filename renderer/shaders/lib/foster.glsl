@@ -37,13 +37,27 @@ float foster_flux_w_m2(float offset_k, FosterDrive drive, FosterSurface s) {
          latent_flux(t, drive.moist).x;
 }
 
+// True for a moist surface whose flux at the start, held over the whole step, would carry it past its balance by more
+// than it is off. Half of such a flux rings from step to step.
+bool foster_rings(vec4 x, float q_begin, FosterDrive begin, vec4 whole_frac, FosterSurface s) {
+  if (!(begin.moist.y > 0.0)) return false;
+  vec4 there = x + (s.resistance_m2k_w * q_begin - x) * whole_frac;
+  float q_there = foster_flux_w_m2(foster_offset_k(there, s), begin, s);
+  return (q_there + q_begin) * q_begin < 0.0;
+}
+
 // States after one step whose drive goes from `begin` to `end`. The flux at its start is that of `begin`. Sets
 // `clamped` where an input lies outside its range.
 vec4 foster_step(vec4 x, FosterDrive begin, FosterDrive end, vec4 start_frac, vec4 end_frac, FosterSurface s,
                  inout bool clamped) {
-  // Advance the states with the flux at the start; the flux at the end is still missing.
+  // Let the flux at the end count for the whole step where that at the start would ring.
   float begin_offset_k = foster_offset_k(x, s);
   float q_begin = foster_flux_w_m2(begin_offset_k, begin, s);
+  if (foster_rings(x, q_begin, begin, start_frac + end_frac, s)) {
+    end_frac += start_frac;
+    start_frac = vec4(0.0);
+  }
+  // Advance the states with the flux at the start; the flux at the end is still missing.
   vec4 partial = x + ((s.resistance_m2k_w * q_begin - x) * start_frac - x * end_frac);
   float p_k = foster_offset_k(partial, s);
   vec4 gain = s.resistance_m2k_w * end_frac;

@@ -120,7 +120,9 @@ TEST(RendererFoster, MoistGroundFollowsTheModelInDoubleAndIsCoolerThanDry) {
         worst_k = std::max(worst_k, std::abs(t - expected));
       }
       EXPECT_LT(worst_k, 0.01) << resistance_s_m << " s/m at " << hours << " h";
-      if (hours == 3.5) EXPECT_LT(expected, dry_k - 3.0) << resistance_s_m;
+      if (hours == 3.5) {
+        EXPECT_LT(expected, dry_k - 3.0) << resistance_s_m;
+      }
     }
   }
 }

@@ -180,6 +180,23 @@ template <class Real>
          s.emission_w_m2_k4 * t2 * t2 - latent_flux(t, d).flux_w_m2;
 }
 
+/// Returns the flags of moist surfaces whose flux at the start of a step, if it held over the whole
+/// step, would carry them past their balance by more than they are off. Half of such a flux rings
+/// from step to step, and grows where a hot surface evaporates more steeply than a cold one.
+template <class Real>
+[[nodiscard]] Mask<Real> foster_rings(const FosterState<Real>& x, const Real& q_begin,
+                                      const FosterDrive<Real>& begin, const FosterGains<Real>& g,
+                                      const FosterSurface<Real>& s) noexcept {
+  const Mask<Real> moist = begin.dew_w_m2_pa > Real(0);
+  if (none(moist)) return moist;
+  Real offset_k = foster_offset_k(x, s);
+  for (std::size_t i = 0; i < kMaxFosterModes; ++i) {
+    offset_k += (s.resistance_m2k_w[i] * q_begin - x[i]) * (g.start_frac[i] + g.end_frac[i]);
+  }
+  const Real q_there = foster_flux_w_m2(offset_k, begin, s);
+  return both(moist, Mask<Real>((q_there + q_begin) * q_begin < Real(0)));
+}
+
 /// Advances `x` by one step whose drive goes from `begin` to `end` (physics.md eq. 18). The
 /// temperature is continuous at the start of the step, and the flux there is that of `begin`: a
 /// change of shade acts at once.
@@ -193,14 +210,19 @@ Mask<Real> foster_step(FosterState<Real>& x, const FosterDrive<Real>& begin,
   // that this gives, R is what each W/m2 of the flux at the end adds to it.
   const Real begin_offset_k = foster_offset_k(x, s);
   const Real q_begin = foster_flux_w_m2(begin_offset_k, begin, s);
+  // Let the flux at the end count for the whole step where that at the start would ring.
+  const Mask<Real> rings = foster_rings(x, q_begin, begin, g, s);
+  FosterState<Real> end_frac;
   FosterState<Real> partial;  // new states before the flux at the end is added
   Real p_k = s.base_offset_k;
   Real r_m2k_w = 0;
   for (std::size_t i = 0; i < kMaxFosterModes; ++i) {
+    const Real start_frac = choose(rings, Real(0), g.start_frac[i]);
+    end_frac[i] = choose(rings, g.start_frac[i] + g.end_frac[i], g.end_frac[i]);
     partial[i] =
-        x[i] + ((s.resistance_m2k_w[i] * q_begin - x[i]) * g.start_frac[i] - x[i] * g.end_frac[i]);
+        x[i] + ((s.resistance_m2k_w[i] * q_begin - x[i]) * start_frac - x[i] * end_frac[i]);
     p_k += partial[i];
-    r_m2k_w += s.resistance_m2k_w[i] * g.end_frac[i];
+    r_m2k_w += s.resistance_m2k_w[i] * end_frac[i];
   }
   const Mask<Real> lasts = r_m2k_w > Real(0);
   if (none(lasts)) return Mask<Real>(false);  // the step has no length
@@ -230,7 +252,7 @@ Mask<Real> foster_step(FosterState<Real>& x, const FosterDrive<Real>& begin,
   const Real q_end =
       choose(steep, (offset_k - p_k) * conductance, foster_flux_w_m2(offset_k, end, s));
   for (std::size_t i = 0; i < kMaxFosterModes; ++i) {
-    x[i] = choose(lasts, partial[i] + s.resistance_m2k_w[i] * q_end * g.end_frac[i], x[i]);
+    x[i] = choose(lasts, partial[i] + s.resistance_m2k_w[i] * q_end * end_frac[i], x[i]);
   }
   return both(root.clamped, lasts);
 }
