@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "emit/scene/base.hpp"
+
 namespace emit::renderer {
 namespace {
 
@@ -13,7 +15,7 @@ bool same_weather(const physics::WeatherSample& a, const physics::WeatherSample&
          a.longwave_down_w_m2 == b.longwave_down_w_m2 && a.air_k == b.air_k &&
          a.wind_m_s == b.wind_m_s && a.cloud_frac == b.cloud_frac &&
          a.environment_k == b.environment_k && a.film_w_m2_k == b.film_w_m2_k &&
-         a.wind_from_rad == b.wind_from_rad;
+         a.wind_from_rad == b.wind_from_rad && a.relative_humidity_frac == b.relative_humidity_frac;
 }
 
 }  // namespace
@@ -23,7 +25,8 @@ Environment::Environment(const scene::ScenarioDesc& scenario)
              physics::Metres(scenario.place.height_m)},
       epoch_utc_ns_(scenario.epoch_utc_ns),
       clear_sky_(scenario.clear_sky),
-      table_(scenario.weather) {
+      table_(scenario.weather),
+      usual_dew_point_k_(scene::usual_dew_point_k(scenario)) {
   live_.reserve(kMaxLiveSamples);
   changes_ns_.reserve(kMaxLiveSamples);
   revisions_.reserve(kMaxLiveSamples);
@@ -83,10 +86,10 @@ physics::Forcing Environment::forcing_at(std::int64_t sim_time_ns,
   if (after == live_.begin() && table_.empty()) {
     return physics::forcing_from_clear_sky(clear_sky_, place_, sun, epoch_utc_ns_ + sim_time_ns);
   }
-  return physics::at_place(after != live_.begin()
-                               ? physics::forcing_from_rows({&*(after - 1), 1}, sim_time_ns)
-                               : physics::forcing_from_rows(table_, sim_time_ns),
-                           place_, sun);
+  const physics::Forcing forcing = after != live_.begin()
+                                       ? physics::forcing_from_rows({&*(after - 1), 1}, sim_time_ns)
+                                       : physics::forcing_from_rows(table_, sim_time_ns);
+  return physics::with_vapour(physics::at_place(forcing, place_, sun), usual_dew_point_k_);
 }
 
 }  // namespace emit::renderer

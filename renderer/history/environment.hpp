@@ -52,6 +52,7 @@ class Environment {
   std::int64_t epoch_utc_ns_ = 0;
   physics::ClearSky clear_sky_;
   std::vector<physics::WeatherSample> table_;
+  double usual_dew_point_k_ = 0.0;  ///< where the weather states no humidity
   std::vector<physics::WeatherSample> live_;
   std::vector<std::int64_t> changes_ns_;  ///< times of the rows of live_
   std::vector<std::uint64_t> revisions_;  ///< revisions of the rows of live_, ascending

@@ -93,7 +93,7 @@ void fit_changes(HistoryInterval& interval, const Environment& environment) noex
         &physics::Forcing::environment_k, &physics::Forcing::stated_film_w_m2_k,
         &physics::Forcing::stated_film_frac, &physics::Forcing::wind_m_s,
         &physics::Forcing::wind_to_east, &physics::Forcing::wind_to_north,
-        &physics::Forcing::gust_m_s, &physics::Forcing::cloud_frac}) {
+        &physics::Forcing::gust_m_s, &physics::Forcing::cloud_frac, &physics::Forcing::vapour_pa}) {
     double mean = 0.0;
     double moment = 0.0;
     double low = parts[0].*value;
@@ -140,6 +140,7 @@ SurfaceForcing open_forcing(const physics::SunPosition& sun,
   out.flow = physics::air_flow(weather);
   out.film = physics::air_film(out.flow);
   out.air_k = weather.air_k;
+  out.moist = physics::moist_air(weather.air_k, out.flow.pressure_pa, weather.vapour_pa);
   return out;
 }
 
@@ -150,11 +151,13 @@ FosterDrive<double> unshadowed_drive(const SurfaceForcing& f, const FosterMateri
   const double short_wave_w_m2 = std::max(0.0, glm::dot(normal, f.sun_w_m2)) +
                                  sky_frac * f.diffuse_w_m2 + (1.0 - sky_frac) * f.reflected_w_m2;
   const double long_wave_w_m2 = sky_frac * f.longwave_w_m2 + (1.0 - sky_frac) * f.environment_w_m2;
-  return {.absorbed_w_m2 = material.solar_absorptance_frac * short_wave_w_m2 +
-                           material.emissivity_frac * long_wave_w_m2,
-          .film_w_m2_k = physics::film_w_m2_k(f.film, normal, material.roughness,
-                                              reference_k + offset_k - f.air_k),
-          .air_offset_k = f.air_k - reference_k};
+  FosterDrive<double> drive{.absorbed_w_m2 = material.solar_absorptance_frac * short_wave_w_m2 +
+                                             material.emissivity_frac * long_wave_w_m2,
+                            .film_w_m2_k = physics::film_w_m2_k(f.film, normal, material.roughness,
+                                                                reference_k + offset_k - f.air_k),
+                            .air_offset_k = f.air_k - reference_k};
+  physics::add_moisture(material.moisture, f.moist, short_wave_w_m2, drive);
+  return drive;
 }
 
 physics::Result<std::vector<FosterMaterial>> foster_materials(
@@ -165,6 +168,7 @@ physics::Result<std::vector<FosterMaterial>> foster_materials(
     entry.solar_absorptance_frac = material.solar_absorptance_frac;
     entry.emissivity_frac = material.emissivity_frac;
     entry.roughness = scene::roughness_factor(material.roughness);
+    entry.moisture = scene::moisture_of(material);
     entry.base_k = material.base_k;
     entry.initial_k = material.initial_k.value_or(options.initial_k);
     if (material.prescribed_k) {

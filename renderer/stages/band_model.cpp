@@ -167,10 +167,9 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
   model.place_m_ = scenario.place.height_m;
   model.turbidity_ = scenario.clear_sky.linke_turbidity;
   model.cloud_base_ = scenario.clear_sky.cloud_base;
-  // Weather tables state no humidity.
-  model.dew_point_k_ = scenario.weather.empty()
-                           ? scenario.clear_sky.dew_point_k
-                           : physics::usual_dew_point_k(scene::mean_air_k(scenario));
+  // The sky keeps to one dew point over the whole run: the humidity of a weather table does not
+  // count.
+  model.dew_point_k_ = scene::usual_dew_point_k(scenario);
   if (auto views = model.build_views(scenario); !views) return tl::unexpected(views.error());
   // Append the tables of the air behind those of the bands.
   for (std::size_t i = 0; i < model.entries_.size(); ++i) {
@@ -413,6 +412,10 @@ std::vector<gpu::MaterialParams> material_params(std::span<const scene::Material
     params.solar_absorptance_frac = static_cast<float>(material.solar_absorptance_frac);
     params.emissivity_frac = static_cast<float>(material.emissivity_frac);
     params.roughness = static_cast<float>(scene::roughness_factor(material.roughness));
+    const physics::MoistSurface moisture = scene::moisture_of(material);
+    params.wetness_frac = static_cast<float>(moisture.wetness_frac);
+    params.resistance_s_m = static_cast<float>(moisture.resistance_s_m);
+    params.night_resistance_s_m = static_cast<float>(moisture.night_resistance_s_m);
     if (material.core_conductance_w_m2_k) {
       params.conductance_w_m2_k = static_cast<float>(*material.core_conductance_w_m2_k);
     } else if (!material.layers.empty()) {

@@ -95,6 +95,14 @@ gpu::FilmParams film_params(const physics::AirFilm& film) noexcept {
   return params;
 }
 
+/// Returns the moisture of the air in float32.
+gpu::MoistAirParams moist_params(const physics::MoistAir& air) noexcept {
+  return {.vapour_pa = static_cast<float>(air.vapour_pa),
+          .psychrometric_pa_k = static_cast<float>(air.psychrometric_pa_k),
+          .heat_j_m3_k = static_cast<float>(air.heat_j_m3_k),
+          .stomata_w_m2 = static_cast<float>(physics::kOpenStomataWM2)};
+}
+
 }  // namespace
 
 LightFrusta set_step(const HistoryInterval& interval, const CameraSetup& camera,
@@ -204,6 +212,8 @@ void set_foster_forcing(const IntervalForcing& forcing, double reference_k,
   set_fluxes(fluxes(forcing.begin), fluxes(forcing.end), params);
   params.film_start = film_params(forcing.begin.film);
   params.film_end = film_params(forcing.end.film);
+  params.moist_start = moist_params(forcing.begin.moist);
+  params.moist_end = moist_params(forcing.end.moist);
   params.air_start_offset_k = static_cast<float>(forcing.begin.air_k - reference_k);
   params.air_end_offset_k = static_cast<float>(forcing.end.air_k - reference_k);
 }

@@ -313,6 +313,27 @@ const std::vector<Case>& cases() {
        material("base_k = 290\nlayers = [{ thickness_m = 0, conductivity_w_m_k = 1, "
                 "density_kg_m3 = 2000, specific_heat_j_kg_k = 900 }]\n"),
        "s.toml:7:27: 'thickness_m' is 0, must be > 0, <= 100"},
+      {"wetness_above_1", material("base_k = 290\nwetness_frac = 1.5\n" + kLayer),
+       "s.toml:7:16: 'wetness_frac' is 1.5, must be 0 .. 1"},
+      {"resistance_below_0", material("base_k = 290\nsurface_resistance_s_m = -1\n" + kLayer),
+       "s.toml:7:26: 'surface_resistance_s_m' is -1, must be 0 .. 10000"},
+      {"resistance_of_a_given_temperature",
+       material("prescribed_k = 400\nsurface_resistance_s_m = 70\n"),
+       "s.toml:7:26: 'surface_resistance_s_m' has no effect: 'prescribed_k' gives the temperature"},
+      {"night_without_day", material("base_k = 290\nnight_resistance_s_m = 200\n" + kLayer),
+       "s.toml:7:24: 'night_resistance_s_m' needs 'surface_resistance_s_m'"},
+      {"night_below_day",
+       material("base_k = 290\nsurface_resistance_s_m = 70\nnight_resistance_s_m = 50\n" + kLayer),
+       "s.toml:8:24: 'night_resistance_s_m' (50.0) is below 'surface_resistance_s_m' (70.0): "
+       "stomata "
+       "close at night"},
+      {"night_of_open_water",
+       material("base_k = 290\nsurface_resistance_s_m = 0\nnight_resistance_s_m = 50\n" + kLayer),
+       "s.toml:8:24: 'night_resistance_s_m' has no effect: 'surface_resistance_s_m' is 0"},
+      {"humidity_above_1",
+       "[[weather.sample]]\ntime_s = 5\ndni_w_m2 = 0\ndhi_w_m2 = 0\nlongwave_down_w_m2 = "
+       "300\nair_k = 290\nwind_m_s = 0\nrelative_humidity_frac = 55\n",
+       "s.toml:9:26: 'relative_humidity_frac' is 55, must be 0 .. 1"},
       {"material_twice", material("prescribed_k = 400\n") + material("prescribed_k = 400\n"),
        "s.toml:8:8: material 'x' is already defined at s.toml:2:1"},
       {"dew_point", "[weather]\nair_mean_k = 290\ndew_point_k = 310\n",

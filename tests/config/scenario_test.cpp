@@ -206,6 +206,9 @@ core_conductance_w_m2_k = 7.5
 modes = [{ tau_s = 100.5, weight_frac = 0.375 }, { tau_s = 2000.0, weight_frac = 0.625 }]
 foster_modes = [{ tau_s = 50.5, resistance_m2k_w = 0.0714 }, { tau_s = 9000.0, resistance_m2k_w = 0.25 }]
 foster_fit = { horizon_s = 99000.0, rms_k = 0.125, max_k = 0.75 }
+wetness_frac = 0.625
+surface_resistance_s_m = 90.5
+night_resistance_s_m = 300.25
 dry_layers_valid = false
 layers = [
   { thickness_m = 0.05, conductivity_w_m_k = 0.7, density_kg_m3 = 2120.0, specific_heat_j_kg_k = 920.0 },
@@ -366,6 +369,11 @@ TEST_F(ConfigTest, every_scenario_key_reaches_its_field) {
   EXPECT_EQ(s.materials[2].foster_modes[1].resistance_m2k_w, 0.25);
   ASSERT_TRUE(s.materials[2].foster_fit.has_value());
   EXPECT_EQ(s.materials[2].foster_fit->max_k, 0.75);
+  EXPECT_EQ(s.materials[2].wetness_frac, 0.625);
+  EXPECT_EQ(s.materials[2].surface_resistance_s_m, 90.5);
+  EXPECT_EQ(s.materials[2].night_resistance_s_m, 300.25);
+  EXPECT_EQ(scene::moisture_of(s.materials[2]).night_resistance_s_m, 300.25);
+  EXPECT_TRUE(scene::moisture_of(s.materials[1]).dry());
   EXPECT_FALSE(s.materials[2].dry_layers_valid);
   EXPECT_TRUE(s.materials[1].dry_layers_valid);
 }
@@ -447,7 +455,8 @@ TEST(ListValues, elements_go_by_a_name_of_their_own) {
 TEST_F(ConfigTest, a_printed_weather_table_loads_to_the_same_values) {
   write("w.csv",
         "time_s,dni_w_m2,dhi_w_m2,longwave_down_w_m2,air_k,wind_m_s,cloud_frac,environment_k,"
-        "film_w_m2_k\n0.1,800.7,100,330,290.15,2,0,,\n60,0,1,2,300,3,0.5,280.3,13.3\n");
+        "film_w_m2_k,relative_humidity_frac\n0.1,800.7,100,330,290.15,2,0,,,\n"
+        "60,0,1,2,300,3,0.5,280.3,13.3,0.625\n");
   const auto first =
       scenario("[weather]\nfile = \"w.csv\"\n[thermal]\nhistory_start_s = 0\nspin_up_s = 0\n");
   ASSERT_TRUE(first.has_value()) << first.error().text;
@@ -460,6 +469,8 @@ TEST_F(ConfigTest, a_printed_weather_table_loads_to_the_same_values) {
   EXPECT_FALSE(second->weather[0].film_w_m2_k.has_value());
   EXPECT_EQ(second->weather[1].environment_k, 280.3);
   EXPECT_EQ(second->weather[1].film_w_m2_k, 13.3);
+  EXPECT_FALSE(second->weather[0].relative_humidity_frac.has_value());
+  EXPECT_EQ(second->weather[1].relative_humidity_frac, 0.625);
 }
 
 TEST_F(ConfigTest, a_minimal_scenario_has_sensible_defaults) {

@@ -112,11 +112,16 @@ TEST_F(ConfigTest, the_shipped_library_is_complete_and_consistent) {
   }
   EXPECT_EQ(families.count(""), 0U);
   EXPECT_GE(families.size(), 10U);
-  // Evaporation, melting and stirring are named wherever they matter.
+  // Plants, water and wet ground evaporate; melting and stirring are named wherever they matter.
   for (const scene::Material& material : loaded->materials) {
-    const bool moist = material.family == "vegetation" ||
-                       material.family == "water, snow and ice" || material.name.ends_with("_wet");
-    EXPECT_TRUE(!moist || !material.dry_layers_valid) << material.name;
+    const bool stirred = material.family == "water, snow and ice";
+    const bool moist = material.family == "vegetation" || material.name == "water" ||
+                       material.name.ends_with("_wet");
+    EXPECT_EQ(moist, !scene::moisture_of(material).dry()) << material.name;
+    EXPECT_TRUE(!stirred || !material.dry_layers_valid) << material.name;
+    if (moist) {
+      EXPECT_FALSE(material.uncertainty.empty()) << material.name;
+    }
   }
 }
 

@@ -17,7 +17,8 @@ constexpr const char* kHeader =
 TEST_F(ConfigTest, weather_is_read_with_columns_in_any_order) {
   write("w.csv",
         "# measured\r\nair_k, time_s,dni_w_m2,dhi_w_m2,longwave_down_w_m2,wind_m_s,cloud_frac,"
-        "environment_k\r\n290,0,800,100,330,2,0,\r\n\r\n291.5,60.5,810,101,331,2.5,0.1,288\r\n");
+        "environment_k,relative_humidity_frac\r\n290,0,800,100,330,2,0,,0.5\r\n\r\n"
+        "291.5,60.5,810,101,331,2.5,0.1,288,\r\n");
   const auto loaded =
       scenario("epoch_utc = 2014-06-21T06:00:00Z\n" + std::string(kWeather) +
                "[place]\nlat_deg = 48\nlon_deg = 11\n[thermal]\nhistory_start_s = 0\n"
@@ -35,6 +36,8 @@ TEST_F(ConfigTest, weather_is_read_with_columns_in_any_order) {
   EXPECT_EQ(loaded->weather[1].cloud_frac, 0.1);
   EXPECT_EQ(loaded->weather[1].environment_k, 288.0);
   EXPECT_FALSE(loaded->weather[1].film_w_m2_k.has_value());
+  EXPECT_EQ(loaded->weather[0].relative_humidity_frac, 0.5);
+  EXPECT_FALSE(loaded->weather[1].relative_humidity_frac.has_value());
 }
 
 TEST_F(ConfigTest, a_film_stands_for_the_wind_and_measured_sun_for_its_clouds) {

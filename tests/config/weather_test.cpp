@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "config/config_support.hpp"
+#include "emit/physics/evaporation.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/physics/weather.hpp"
 
@@ -118,6 +119,23 @@ TEST_F(Weather, what_a_table_lacks_before_its_first_row_the_clear_sky_models_mak
                                   "to 2014-06-22T00:00:00Z)"),
                         HasSubstr("needs it from -172800 s (2014-06-19T00:00:00Z)"),
                         HasSubstr("The clear-sky models make the weather before 0 s"))));
+}
+
+TEST_F(Weather, what_the_models_make_keeps_the_vapour_of_the_table) {
+  std::string csv =
+      "time_s,dni_w_m2,dhi_w_m2,longwave_down_w_m2,air_k,wind_m_s,cloud_frac,"
+      "relative_humidity_frac\n";
+  for (int hour = 0; hour <= 24; ++hour) {
+    csv += fmt::format("{},0,0,330,290,2,0,0.55\n", hour * 3600);
+  }
+  const auto loaded = load(csv);
+  ASSERT_EQ(loaded.weather.front().sim_time_ns, -48 * kHourNs);
+  for (const scene::WeatherSample& row : loaded.weather) {
+    ASSERT_TRUE(row.relative_humidity_frac.has_value()) << row.sim_time_ns;
+    EXPECT_LE(*row.relative_humidity_frac, 1.0);
+    EXPECT_NEAR(*row.relative_humidity_frac * physics::saturation_over_water_pa(row.air_k),
+                0.55 * physics::saturation_over_water_pa(290.0), 1e-6);
+  }
 }
 
 TEST_F(Weather, a_completed_table_prints_and_loads_to_the_same_values) {

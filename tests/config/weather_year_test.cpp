@@ -10,6 +10,7 @@
 
 #include "config/config_support.hpp"
 #include "emit/physics/constants.hpp"
+#include "emit/physics/evaporation.hpp"
 #include "emit/physics/sun.hpp"
 #include "tables/weather_year.hpp"
 
@@ -149,6 +150,12 @@ TEST_F(ConfigTest, epw_missing_values_are_filled_and_said) {
   const auto loaded = scenario(kScenario);
   ASSERT_TRUE(loaded) << loaded.error().text;
   EXPECT_NEAR(row_at(*loaded, 12.0).air_k, 273.15 + 12.6, 1e-9);
+  const scene::WeatherSample noon = row_at(*loaded, 12.0);
+  ASSERT_TRUE(noon.relative_humidity_frac.has_value());
+  EXPECT_NEAR(
+      *noon.relative_humidity_frac,
+      physics::saturation_over_water_pa(268.15) / physics::saturation_over_water_pa(noon.air_k),
+      1e-9);
   // Dew point -5 C and half the sky covered.
   EXPECT_GT(row_at(*loaded, 12.0).longwave_down_w_m2, 250.0);
   EXPECT_LT(row_at(*loaded, 12.0).longwave_down_w_m2, 380.0);

@@ -118,6 +118,10 @@ const KeyTable<WeatherSample>& weather_sample_keys() {
           "Convection coefficient of all faces. Without it the air film of physics.md "
           "section 8 gives one for each. "
           "emit2014 does not use it."),
+      number<WeatherSample>("relative_humidity_frac", "", between(0, 1),
+                            EMIT_FIELD(relative_humidity_frac),
+                            "foster: relative humidity of the air, for materials that evaporate. "
+                            "Without it the dew point is that of 60 % at the mean air."),
   };
   return keys;
 }
@@ -141,8 +145,8 @@ const KeyTable<WeatherDraft>& weather_keys() {
           "Clear-sky models: amplitude of the daily cosine, which is warmest at 15:00 solar time."),
       open_default(number<WeatherDraft>(
           "dew_point_k", "K", between(180, 320), EMIT_FIELD(clear_sky.dew_point_k),
-          "Clear-sky models: dew point. It gives the long-wave emissivity of the sky. Without it "
-          "that of 60 % relative humidity.")),
+          "Clear-sky models: dew point. It gives the long-wave emissivity of the sky and the "
+          "humidity of the air. Without it that of 60 % relative humidity.")),
       number<WeatherDraft>("wind_m_s", "m s-1", between(limits::kWindMS),
                            EMIT_FIELD(clear_sky.wind_m_s), "Clear-sky models: wind speed."),
       number<WeatherDraft>("wind_from_deg", "deg", between(0, 360),

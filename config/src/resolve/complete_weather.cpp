@@ -5,10 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <span>
 
 #include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
+#include "emit/physics/evaporation.hpp"
 #include "emit/physics/limits.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/physics/weather.hpp"
@@ -150,6 +152,18 @@ double fit_dew_point_k(std::span<const WeatherSample> rows, const ClearSky& mode
   return 0.5 * (lo_k + hi_k);
 }
 
+/// Mean vapour pressure of the rows that state a humidity; nothing if none does.
+std::optional<double> mean_vapour_pa(std::span<const WeatherSample> rows) {
+  double sum_pa = 0.0;
+  double count = 0.0;
+  for (const WeatherSample& row : rows) {
+    if (!row.relative_humidity_frac) continue;
+    sum_pa += *row.relative_humidity_frac * physics::saturation_over_water_pa(row.air_k);
+    count += 1.0;
+  }
+  return count > 0.0 ? std::optional(sum_pa / count) : std::nullopt;
+}
+
 /// Parameters of the clear-sky models that go on from these rows.
 ClearSky fitted(std::span<const WeatherSample> rows, const ModelSky& sky,
                 const StatedClearSky& stated, ClearSky model) {
@@ -226,11 +240,17 @@ bool complete_weather(std::string_view name, const StatedClearSky& stated,
 
   scenario.clear_sky =
       fitted(std::span(rows.begin(), first_day_end), sky, stated, scenario.clear_sky);
+  // The made weather keeps the vapour of the table's first day, as far as its air can hold it.
+  const std::optional<double> vapour_pa = mean_vapour_pa(std::span(rows.begin(), first_day_end));
   std::vector<WeatherSample> made;
   const std::int64_t step_ns = first_ns - from_ns > kLongFillNs ? kLongFillStepNs : kFillStepNs;
   // The weather passes into the table over the last, shorter step.
   for (std::int64_t at_ns = from_ns; at_ns < first_ns; at_ns += step_ns) {
-    made.push_back(sky.at(scenario.clear_sky, at_ns));
+    WeatherSample& row = made.emplace_back(sky.at(scenario.clear_sky, at_ns));
+    if (vapour_pa) {
+      row.relative_humidity_frac =
+          std::min(1.0, *vapour_pa / physics::saturation_over_water_pa(row.air_k));
+    }
   }
   rows.insert(rows.begin(), made.begin(), made.end());
   scenario.warnings.push_back(fmt::format(

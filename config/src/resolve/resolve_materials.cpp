@@ -53,6 +53,32 @@ void check_bands(const Node& node, const std::vector<std::string>& known_bands,
   }
 }
 
+/// Reports keys of evaporation that can have no effect, or that contradict each other.
+void check_moisture(const Material& material, const Node& node, Diagnostics& diagnostics) {
+  if (material.prescribed_k) {
+    for (const char* key : {"wetness_frac", "surface_resistance_s_m", "night_resistance_s_m"}) {
+      if (!node.has(key)) continue;
+      diagnostics.add(key_location(node, key),
+                      fmt::format("'{}' has no effect: 'prescribed_k' gives the temperature", key));
+    }
+    return;
+  }
+  if (!material.night_resistance_s_m) return;
+  if (!material.surface_resistance_s_m) {
+    diagnostics.add(key_location(node, "night_resistance_s_m"),
+                    "'night_resistance_s_m' needs 'surface_resistance_s_m'");
+  } else if (!(*material.surface_resistance_s_m > 0.0)) {
+    diagnostics.add(key_location(node, "night_resistance_s_m"),
+                    "'night_resistance_s_m' has no effect: 'surface_resistance_s_m' is 0");
+  } else if (*material.night_resistance_s_m < *material.surface_resistance_s_m) {
+    diagnostics.add(key_location(node, "night_resistance_s_m"),
+                    fmt::format("'night_resistance_s_m' ({}) is below 'surface_resistance_s_m' "
+                                "({}): stomata close at night",
+                                toml_number(*material.night_resistance_s_m),
+                                toml_number(*material.surface_resistance_s_m)));
+  }
+}
+
 void check_material(const Material& material, const Node& node,
                     const std::vector<std::string>& known_bands, Diagnostics& diagnostics) {
   if (node.has("name") && material.name.empty()) {
@@ -93,6 +119,7 @@ void check_material(const Material& material, const Node& node,
                                   of_modes, of_layers));
     }
   }
+  check_moisture(material, node, diagnostics);
   check_bands(node, known_bands, diagnostics);
   if (const Node* spread = node.find("spread")) check_bands(*spread, known_bands, diagnostics);
 }

@@ -49,7 +49,8 @@ Result<std::vector<scene::WeatherSample>> load_weather_csv(const std::filesystem
                               {"cloud_frac", false, between(limits::kCloudFrac)},
                               {"environment_k", false, between(limits::kEnvironmentK)},
                               {"film_w_m2_k", false, between(limits::kFilmWM2K)},
-                              {"wind_from_deg", false, between(0, 360)}});
+                              {"wind_from_deg", false, between(0, 360)},
+                              {"relative_humidity_frac", false, between(0, 1)}});
   if (!rows) {
     return tl::unexpected<physics::Error>(rows.error());
   }
@@ -65,6 +66,7 @@ Result<std::vector<scene::WeatherSample>> load_weather_csv(const std::filesystem
     sample.environment_k = row.numbers[7];
     sample.film_w_m2_k = row.numbers[8];
     if (row.numbers[9]) sample.wind_from_rad = *row.numbers[9] * physics::kDegree;
+    sample.relative_humidity_frac = row.numbers[10];
     if (!row.numbers[5] && !sample.film_w_m2_k) {
       return make_error(
           ErrorCode::config,

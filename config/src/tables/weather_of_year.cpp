@@ -10,6 +10,7 @@
 
 #include "emit/physics/clear_sky.hpp"
 #include "emit/physics/constants.hpp"
+#include "emit/physics/evaporation.hpp"
 #include "emit/physics/sun.hpp"
 #include "weather_year.hpp"
 
@@ -261,6 +262,12 @@ void append_rows(const WeatherYear& year, std::span<const Interval> run,
     sample.air_k = mix(&YearRecord::air_k);
     sample.wind_m_s = mix(&YearRecord::wind_m_s);
     sample.wind_from_rad = wind_between(from, to, share);
+    if (from.dew_point_k && to.dew_point_k) {
+      // A dew point above the air comes from rounding: the air is saturated.
+      sample.relative_humidity_frac =
+          std::min(1.0, physics::saturation_over_water_pa(mix(&YearRecord::dew_point_k)) /
+                            physics::saturation_over_water_pa(sample.air_k));
+    }
     out.push_back(sample);
   }
 }

@@ -295,15 +295,18 @@ WeatherReport report_table(const std::vector<scene::WeatherSample>& rows,
   ColumnSum direction;
   ColumnSum environment;
   ColumnSum film;
+  ColumnSum humidity;
   for (const scene::WeatherSample& row : rows) {
     direction.add(row.wind_from_rad ? std::optional(*row.wind_from_rad / physics::kDegree)
                                     : std::nullopt);
     environment.add(row.environment_k);
     film.add(row.film_w_m2_k);
+    humidity.add(row.relative_humidity_frac);
   }
   direction.write("wind from", "deg", report.columns);
   environment.write("surroundings", "K", report.columns);
   film.write("film", "W/m2/K", report.columns);
+  humidity.write("relative humidity", "", report.columns);
   if (rows.size() < 2) return report;
   if (origin) check_table_sun(rows, *origin, report);
   take_rows(rows, report);

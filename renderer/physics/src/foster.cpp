@@ -143,7 +143,10 @@ void advance_lanes(const std::array<const FosterLane*, kFosterLanes>& lanes,
     return FosterDrive<Lanes>{
         gathered([&](std::size_t l) { return (lanes[l]->*which).absorbed_w_m2; }),
         gathered([&](std::size_t l) { return (lanes[l]->*which).film_w_m2_k; }),
-        gathered([&](std::size_t l) { return (lanes[l]->*which).air_offset_k; })};
+        gathered([&](std::size_t l) { return (lanes[l]->*which).air_offset_k; }),
+        gathered([&](std::size_t l) { return (lanes[l]->*which).evaporation_w_m2_pa; }),
+        gathered([&](std::size_t l) { return (lanes[l]->*which).dew_w_m2_pa; }),
+        gathered([&](std::size_t l) { return (lanes[l]->*which).vapour_pa; })};
   };
   FosterSurface<Lanes> surface;
   surface.emission_w_m2_k4 =

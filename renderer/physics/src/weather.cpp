@@ -6,6 +6,7 @@
 
 #include "emit/physics/air_film.hpp"
 #include "emit/physics/check.hpp"
+#include "emit/physics/evaporation.hpp"
 #include "emit/physics/gusts.hpp"
 
 namespace emit::physics {
@@ -31,6 +32,10 @@ Forcing forcing_of(const WeatherSample& row) noexcept {
   f.wind_m_s = row.wind_m_s;
   set_wind_direction(row.wind_from_rad, f);
   f.cloud_frac = row.cloud_frac;
+  if (row.relative_humidity_frac) {
+    f.stated_vapour_pa = *row.relative_humidity_frac * saturation_over_water_pa(row.air_k);
+    f.stated_vapour_frac = 1.0;
+  }
   return f;
 }
 
@@ -70,7 +75,15 @@ Forcing forcing_from_rows(std::span<const WeatherSample> rows, std::int64_t sim_
   f.wind_to_east = mix(&Forcing::wind_to_east);
   f.wind_to_north = mix(&Forcing::wind_to_north);
   f.cloud_frac = mix(&Forcing::cloud_frac);
+  f.stated_vapour_pa = mix(&Forcing::stated_vapour_pa);
+  f.stated_vapour_frac = mix(&Forcing::stated_vapour_frac);
   return f;
+}
+
+Forcing with_vapour(Forcing forcing, double usual_dew_point_k) noexcept {
+  const double usual_pa = saturation_over_water_pa(std::min(usual_dew_point_k, forcing.air_k));
+  forcing.vapour_pa = forcing.stated_vapour_pa + (1.0 - forcing.stated_vapour_frac) * usual_pa;
+  return forcing;
 }
 
 Forcing at_place(Forcing forcing, const GeoPlace& place, const SunPosition& sun) noexcept {
@@ -100,7 +113,7 @@ Forcing forcing_from_clear_sky(const ClearSky& model, const GeoPlace& place, con
   f.wind_m_s = model.wind_m_s;
   set_wind_direction(model.wind_from_rad, f);
   f.cloud_frac = model.cloud_frac;
-  return at_place(f, place, sun);
+  return with_vapour(at_place(f, place, sun), model.dew_point_k);
 }
 
 }  // namespace emit::physics

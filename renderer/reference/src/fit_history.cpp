@@ -9,9 +9,12 @@
 #include <utility>
 
 #include "emit/physics/constants.hpp"
+#include "emit/physics/evaporation.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/physics/weather.hpp"
 #include "emit/reference/layer_solver.hpp"
+#include "emit/reference/surface_forcing.hpp"
+#include "emit/scene/base.hpp"
 
 namespace emit::reference {
 namespace {
@@ -93,7 +96,9 @@ class ForcingTable {
             mix(&GroundForcing::diffuse_w_m2),
             mix(&GroundForcing::longwave_w_m2),
             mix(&GroundForcing::film_w_m2_k),
-            mix(&GroundForcing::air_k)};
+            mix(&GroundForcing::air_k),
+            mix(&GroundForcing::vapour_pa),
+            mix(&GroundForcing::pressure_pa)};
   }
 
  private:
@@ -102,28 +107,66 @@ class ForcingTable {
   std::span<const GroundForcing> rows_;
 };
 
-/// Returns the drive of a level, open surface of a material, physics.md eq. 16.
-FosterDrive<double> drive_of(const scene::Material& material, const GroundForcing& f,
-                             double sun_frac) noexcept {
-  return {.absorbed_w_m2 =
-              material.solar_absorptance_frac * (f.direct_w_m2 * sun_frac + f.diffuse_w_m2) +
-              material.emissivity_frac * f.longwave_w_m2,
-          .film_w_m2_k = f.film_w_m2_k,
-          .air_offset_k = f.air_k - physics::kReferenceK};
+/// Input of a face at an instant, for the model and for the reference.
+struct FaceInput {
+  FosterDrive<double> drive;
+  std::optional<FaceMoisture> water;
+};
+/// Returns the input of a level, open surface of a material, physics.md eq. 16. `moisture` is dry
+/// for models without evaporation.
+FaceInput input_of(const scene::Material& material, const physics::MoistSurface& moisture,
+                   const GroundForcing& f, double sun_frac) noexcept {
+  const double shortwave_w_m2 = f.direct_w_m2 * sun_frac + f.diffuse_w_m2;
+  FaceInput out{.drive = {.absorbed_w_m2 = material.solar_absorptance_frac * shortwave_w_m2 +
+                                           material.emissivity_frac * f.longwave_w_m2,
+                          .film_w_m2_k = f.film_w_m2_k,
+                          .air_offset_k = f.air_k - physics::kReferenceK},
+                .water = std::nullopt};
+  if (moisture.dry()) return out;
+  physics::add_moisture(moisture, physics::moist_air(f.air_k, f.pressure_pa, f.vapour_pa),
+                        shortwave_w_m2, out.drive);
+  out.water = FaceMoisture{.vapour_pa = f.vapour_pa,
+                           .pressure_pa = f.pressure_pa,
+                           .wetness_frac = moisture.wetness_frac,
+                           .resistance_s_m = light_resistance_s_m(moisture, shortwave_w_m2)};
+  return out;
+}
+
+/// Returns the input between `a` (f = 0) and `b` (f = 1), linear in f.
+FaceInput between(const FaceInput& a, const FaceInput& b, double f) noexcept {
+  FaceInput out{.drive = physics::lerp(a.drive, b.drive, f), .water = a.water};
+  if (!a.water || !b.water) return out;
+  const auto mix = [&](double FaceMoisture::*m) {
+    return *a.water.*m + f * (*b.water.*m - *a.water.*m);
+  };
+  out.water->vapour_pa = mix(&FaceMoisture::vapour_pa);
+  out.water->pressure_pa = mix(&FaceMoisture::pressure_pa);
+  out.water->resistance_s_m = mix(&FaceMoisture::resistance_s_m);
+  return out;
+}
+
+/// Sets the input of a step.
+void set_ends(const FaceInput& begin, const FaceInput& end, FitStep& step) noexcept {
+  step.begin = begin.drive;
+  step.begin_water = begin.water;
+  step.end = end.drive;
+  step.end_water = end.water;
 }
 
 /// Converts a drive to the reference solver's units.
-FaceState face_of(const FosterDrive<double>& drive) noexcept {
-  return {drive.absorbed_w_m2, drive.film_w_m2_k, physics::kReferenceK + drive.air_offset_k};
+FaceState face_of(const FosterDrive<double>& drive,
+                  const std::optional<FaceMoisture>& water) noexcept {
+  return {drive.absorbed_w_m2, drive.film_w_m2_k, physics::kReferenceK + drive.air_offset_k,
+          std::nullopt, water};
 }
 
 /// Advances the solver along a history and fills in the truth at the end of every step.
 void run_reference(LayerSolver& solver, double emissivity_frac, FitHistory& history) {
   for (FitStep& step : history.steps) {
     const double begin_s = solver.time_s();
-    solver.advance(
-        FaceSegment{begin_s, begin_s + step.dt_s, face_of(step.begin), face_of(step.end)},
-        emissivity_frac);
+    solver.advance(FaceSegment{begin_s, begin_s + step.dt_s, face_of(step.begin, step.begin_water),
+                               face_of(step.end, step.end_water)},
+                   emissivity_frac);
     step.truth_k = solver.face_k();
   }
 }
@@ -160,6 +203,7 @@ std::vector<GroundForcing> ground_forcing(const scene::ScenarioDesc& scenario, d
                                 physics::Radians(scenario.place.lon_rad),
                                 physics::Metres(scenario.place.height_m)};
   const std::vector<physics::WeatherSample>& rows = scenario.weather;
+  const double dew_point_k = scene::usual_dew_point_k(scenario);
   std::vector<GroundForcing> out;
   const auto count = static_cast<std::size_t>(std::ceil((end_s - begin_s) / step_s)) + 1;
   // Sample the forcing. Direct sun is that on level ground, after clouds.
@@ -174,7 +218,8 @@ std::vector<GroundForcing> ground_forcing(const scene::ScenarioDesc& scenario, d
     out.push_back({time_s,
                    f.direct_normal_w_m2 * (1.0 - f.cloud_frac) * std::max(0.0, sun.direction_enu.z),
                    f.diffuse_horizontal_w_m2, f.longwave_down_w_m2, physics::typical_film_w_m2_k(f),
-                   f.air_k});
+                   f.air_k, physics::with_vapour(f, dew_point_k).vapour_pa,
+                   physics::standard_pressure_pa(f.height_m)});
   }
   return out;
 }
@@ -206,6 +251,9 @@ Result<FitProblem> material_problem(const scene::Material& material,
   }
   FitProblem problem = problem_of(material, material.initial_k.value_or(initial_k));
   const ForcingTable table(forcing);
+  // The published model has no evaporation, so its truth has none either.
+  const physics::MoistSurface moisture =
+      options.model == FitModel::foster ? scene::moisture_of(material) : physics::MoistSurface{};
 
   // Build the spin-up: full sun, with residuals over the last day.
   const double begin_s = start_s - options.spin_up_s;
@@ -220,8 +268,8 @@ Result<FitProblem> material_problem(const scene::Material& material,
         begin_s + options.spin_up_s * static_cast<double>(i + 1) / static_cast<double>(spin_steps);
     FitStep step;
     step.dt_s = options.spin_up_s / static_cast<double>(spin_steps);
-    step.begin = drive_of(material, table.at(a_s, false), 1.0);
-    step.end = drive_of(material, table.at(b_s, true), 1.0);
+    set_ends(input_of(material, moisture, table.at(a_s, false), 1.0),
+             input_of(material, moisture, table.at(b_s, true), 1.0), step);
     if (b_s - start_s >= next_sample_s) {
       step.weight = kDayBeforeWeight;
       next_sample_s = b_s - start_s + kDayBeforeEveryS;
@@ -238,17 +286,17 @@ Result<FitProblem> material_problem(const scene::Material& material,
       const double b_s =
           options.history_s * static_cast<double>(i + 1) / static_cast<double>(samples);
       const double sun_frac = shaded(scenario, a_s, b_s) ? 0.0 : 1.0;
-      const FosterDrive<double> begin =
-          drive_of(material, table.at(start_s + a_s, false), sun_frac);
-      const FosterDrive<double> end = drive_of(material, table.at(start_s + b_s, true), sun_frac);
+      const FaceInput begin =
+          input_of(material, moisture, table.at(start_s + a_s, false), sun_frac);
+      const FaceInput end = input_of(material, moisture, table.at(start_s + b_s, true), sun_frac);
       // Split the steps after an edge: the model is to be judged, not the length of its steps.
       const double since_s = since_edge_s(scenario, b_s);
       const int split = since_s <= kFineAfterEdgeS ? 8 : 1;
       for (int part = 0; part < split; ++part) {
         FitStep step;
         step.dt_s = (b_s - a_s) / split;
-        step.begin = physics::lerp(begin, end, part / static_cast<double>(split));
-        step.end = physics::lerp(begin, end, (part + 1) / static_cast<double>(split));
+        set_ends(between(begin, end, part / static_cast<double>(split)),
+                 between(begin, end, (part + 1) / static_cast<double>(split)), step);
         if (part + 1 == split) step.weight = since_s <= kAfterEdgeS ? kAfterEdgeWeight : 1.0;
         history.steps.push_back(step);
       }

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "emit/physics/constants.hpp"
 #include "emit/reference/fit.hpp"
+#include "emit/reference/layer_solver.hpp"
 
 namespace emit::reference {
 
@@ -14,6 +16,8 @@ struct FitStep {
   double dt_s = 0.0;
   physics::FosterDrive<double> begin;  ///< air_offset_k is an offset from physics::kReferenceK
   physics::FosterDrive<double> end;
+  std::optional<FaceMoisture> begin_water;  ///< what the reference takes for the moist drive
+  std::optional<FaceMoisture> end_water;
   double truth_k = 0.0;     ///< temperature at the end of the step
   double weight = 0.0;      ///< weight of the residual; 0 if there is none
   std::uint32_t gains = 0;  ///< index of the step's length in step_lengths_s

@@ -44,6 +44,26 @@ ExchangeFace surface_of(const VoxelModel& model, const SolidFace& face,
           info.in_cavity};
 }
 
+/// Adds the latent heat of a face to its film and air, along its tangent at the temperature of now.
+/// The solver takes film and air as constant over a stage, to second order in its step, and a
+/// tangent is as good as that.
+void add_latent(const ClimateNode& now, const physics::MoistSurface& moisture,
+                double shortwave_w_m2, double face_k, double& film_w_m2_k, double& air_k) {
+  if (!(film_w_m2_k > 0.0)) return;
+  const FaceMoisture face{.vapour_pa = now.vapour_pa,
+                          .pressure_pa = now.flow.pressure_pa,
+                          .wetness_frac = moisture.wetness_frac,
+                          .resistance_s_m = light_resistance_s_m(moisture, shortwave_w_m2)};
+  constexpr double kDifferenceK = 0.01;
+  const auto latent_w_m2 = [&](double k) { return face.latent_w_m2(k, now.air_k, film_w_m2_k); };
+  const double slope_w_m2_k =
+      (latent_w_m2(face_k + kDifferenceK) - latent_w_m2(face_k - kDifferenceK)) /
+      (2.0 * kDifferenceK);
+  const double into_w_m2 = film_w_m2_k * air_k + slope_w_m2_k * face_k - latent_w_m2(face_k);
+  film_w_m2_k += slope_w_m2_k;
+  air_k = into_w_m2 / film_w_m2_k;
+}
+
 /// Temperature field of another solver's grid, trilinear between its nodes.
 class NodeField {
  public:
@@ -124,6 +144,7 @@ SolidRadiation::SolidRadiation(const VoxelModel& model, const SolidSolver& solve
   for (const SolidFace& face : faces) {
     surfaces_.push_back(surface_of(model, face, geometry));
     face_material_.push_back(model.face(face).material);
+    moisture_.push_back(scene::moisture_of(geometry.materials[face_material_.back()]));
   }
   exchange_ = std::make_unique<SceneExchange>(faces, surfaces_, finder_, instant, options.rays);
   sun_ = std::make_unique<SunOnFaces>(faces, surfaces_);
@@ -166,6 +187,10 @@ void SolidRadiation::drive(double time_s, std::span<const double> face_k, const 
     out.film_w_m2_k[f] =
         s.enclosed ? 0.0 : physics::film_w_m2_k(film, s.normal, s.roughness, face_k[f] - now.air_k);
     out.air_k[f] = now.air_k;
+    if (!s.enclosed && !moisture_[f].dry()) {
+      add_latent(now, moisture_[f], direct_w_m2_[f] + incoming_[f].shortwave_w_m2, face_k[f],
+                 out.film_w_m2_k[f], out.air_k[f]);
+    }
     out.absorbed_w_m2[f] =
         s.enclosed ? s.emissivity_frac * physics::kStefanBoltzmannWPerM2K4 * cavity4
                    : s.solar_absorptance_frac * (direct_w_m2_[f] + incoming_[f].shortwave_w_m2) +

@@ -52,6 +52,7 @@ class SolidRadiation {
   bool exchanges_;
   std::vector<ExchangeFace> surfaces_;
   std::vector<std::uint32_t> face_material_;
+  std::vector<physics::MoistSurface> moisture_;  ///< by face
   FaceFinder finder_;
   std::unique_ptr<SceneExchange> exchange_;
   std::unique_ptr<SunOnFaces> sun_;

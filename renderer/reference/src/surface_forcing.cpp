@@ -11,6 +11,7 @@
 #include "emit/physics/constants.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/physics/weather.hpp"
+#include "emit/scene/base.hpp"
 
 namespace emit::reference {
 namespace {
@@ -27,13 +28,15 @@ struct Weather {
   std::int64_t epoch_utc_ns = 0;
   physics::ClearSky clear_sky;
   std::vector<physics::WeatherSample> rows;
+  double usual_dew_point_k = 0.0;
 
   explicit Weather(const scene::ScenarioDesc& scenario)
       : place{physics::Radians(scenario.place.lat_rad), physics::Radians(scenario.place.lon_rad),
               physics::Metres(scenario.place.height_m)},
         epoch_utc_ns(scenario.epoch_utc_ns),
         clear_sky(scenario.clear_sky),
-        rows(scenario.weather) {}
+        rows(scenario.weather),
+        usual_dew_point_k(scene::usual_dew_point_k(scenario)) {}
 
   /// Returns the climate at a time. `before` gives the limit from earlier times at a jump of the
   /// table. `stated` returns whether the weather gives the temperature of the surroundings.
@@ -56,6 +59,7 @@ struct Weather {
     node.air_k = forcing.air_k;
     node.flow = physics::air_flow(forcing);
     node.surroundings_k = forcing.environment_k;
+    node.vapour_pa = physics::with_vapour(forcing, usual_dew_point_k).vapour_pa;
     stated = forcing.environment_stated;
     return node;
   }
@@ -108,10 +112,27 @@ FaceState face_state(const ClimateNode& climate, const SurfaceOptics& surface,
       view.scene_shortwave_w_m2 + ground_frac * surroundings_reflectance_frac * global;
   const double longwave = view.sky_frac * climate.longwave_down_w_m2 + view.scene_longwave_w_m2 +
                           ground_frac * physics::kStefanBoltzmannWPerM2K4 * env2 * env2;
-  return {surface.solar_absorptance_frac * shortwave + surface.emissivity_frac * longwave, 0.0,
-          climate.air_k,
-          FaceFilm{physics::air_film(climate.flow), surface.normal, surface.roughness,
-                   surface.both_sides}};
+  FaceState out{surface.solar_absorptance_frac * shortwave + surface.emissivity_frac * longwave,
+                0.0, climate.air_k,
+                FaceFilm{physics::air_film(climate.flow), surface.normal, surface.roughness,
+                         surface.both_sides}};
+  if (!surface.moisture.dry()) {
+    out.moisture =
+        FaceMoisture{.vapour_pa = climate.vapour_pa,
+                     .pressure_pa = climate.flow.pressure_pa,
+                     .wetness_frac = surface.moisture.wetness_frac,
+                     .resistance_s_m = light_resistance_s_m(surface.moisture, shortwave)};
+  }
+  return out;
+}
+
+double light_resistance_s_m(const physics::MoistSurface& moisture, double shortwave_w_m2) noexcept {
+  constexpr double kOpenWM2 = 100.0;
+  const double day_s_m = moisture.resistance_s_m;
+  if (!(day_s_m > 0.0)) return 0.0;
+  const double dark_frac = 1.0 - std::clamp(shortwave_w_m2 / kOpenWM2, 0.0, 1.0);
+  const double slower = 1.0 - day_s_m / moisture.night_resistance_s_m;
+  return day_s_m / (1.0 - dark_frac * slower);
 }
 
 ViewSample open_view(const glm::dvec3& normal) noexcept {
@@ -151,7 +172,8 @@ ClimateNode SurfaceClimate::at(std::int64_t time_ns) const noexcept {
           mix(a.longwave_down_w_m2, b.longwave_down_w_m2),
           mix(a.air_k, b.air_k),
           physics::between_flows(a.flow, b.flow, f),
-          mix(a.surroundings_k, b.surroundings_k)};
+          mix(a.surroundings_k, b.surroundings_k),
+          mix(a.vapour_pa, b.vapour_pa)};
 }
 
 Result<SurfaceClimate> SurfaceClimate::create(const scene::ScenarioDesc& scenario,
@@ -209,7 +231,9 @@ Result<SurfaceClimate> SurfaceClimate::create(const scene::ScenarioDesc& scenari
     const SurfaceOptics surface{{0.0, 0.0, 1.0},
                                 ground->solar_absorptance_frac,
                                 ground->emissivity_frac,
-                                scene::roughness_factor(ground->roughness)};
+                                scene::roughness_factor(ground->roughness),
+                                false,
+                                scene::moisture_of(*ground)};
     std::vector<ForcingRow> rows;
     std::vector<double> times_s;
     for (const ClimateNode& node : climate.nodes_) {

@@ -35,6 +35,11 @@ double mean_air_k(const ScenarioDesc& scenario) noexcept {
   return sum_k / kPartsOfDay;
 }
 
+double usual_dew_point_k(const ScenarioDesc& scenario) noexcept {
+  return scenario.weather.empty() ? scenario.clear_sky.dew_point_k
+                                  : physics::usual_dew_point_k(mean_air_k(scenario));
+}
+
 double base_temperature_k(const Material& material, const ScenarioDesc& scenario) {
   if (material.base != BaseKind::ground) return mean_air_k(scenario);
   const physics::GeoPlace place{physics::Radians(scenario.place.lat_rad),

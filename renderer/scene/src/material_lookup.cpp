@@ -4,9 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "emit/physics/check.hpp"
+#include "emit/physics/constants.hpp"
 #include "emit/physics/nearest_name.hpp"
 #include "emit/scene/base.hpp"
 
@@ -131,6 +133,64 @@ Result<std::vector<std::size_t>> MaterialLookup::resolve(std::uint32_t object_in
   return positions;
 }
 
+void MaterialLookup::warn_of_moisture() {
+  std::vector<std::string_view> moist;
+  std::vector<std::string_view> wet;  // without a resistance: soil or water
+  for (std::size_t i = 0; i < library_.size(); ++i) {
+    const physics::MoistSurface moisture = moisture_of(library_[i]);
+    const bool around = library_[i].name == scenario_->thermal.surroundings_material;
+    if (moisture.dry() || !(used_[i] || around)) continue;
+    moist.push_back(library_[i].name);
+    if (moisture.resistance_s_m == 0.0 && library_[i].dry_layers_valid) {
+      wet.push_back(library_[i].name);
+    }
+  }
+  if (moist.empty()) return;
+  const auto warn = [&](std::string_view text) {
+    warnings_.push_back(fmt::format("{}: '{}' evaporate{}, {}", scenario_->file.string(),
+                                    fmt::join(moist, "', '"), moist.size() == 1 ? "s" : "", text));
+  };
+  if (scenario_->thermal.model == ThermalModel::emit2014) {
+    warn(
+        "which emit2014 leaves out: temperatures are those of dry layers, too warm by 5 to 30 K "
+        "by day");
+    return;
+  }
+  if (!wet.empty()) {
+    warnings_.push_back(
+        fmt::format("{}: '{}' stay{} as wet as stated over the whole run: drying "
+                    "is not modelled",
+                    scenario_->file.string(), fmt::join(wet, "', '"), wet.size() == 1 ? "s" : ""));
+  }
+  // The history is what matters, from its start to a day of frames.
+  const std::vector<physics::WeatherSample>& rows = scenario_->weather;
+  if (!rows.empty() && std::ranges::any_of(rows, [](const physics::WeatherSample& row) {
+        return !row.relative_humidity_frac;
+      })) {
+    warn(
+        fmt::format("but weather does not state the humidity (relative_humidity_frac) in every "
+                    "row: a dew point of {:.1f} K counts there, that of 60 % at the mean air",
+                    usual_dew_point_k(*scenario_)));
+  }
+  double coldest_k = scenario_->clear_sky.air_mean_k - scenario_->clear_sky.air_amplitude_k;
+  if (!rows.empty()) {
+    const std::int64_t from_ns = scenario_->thermal.history_start_ns;
+    coldest_k = std::numeric_limits<double>::infinity();
+    for (const physics::WeatherSample& row : rows) {
+      constexpr std::int64_t kDayNs = 86'400'000'000'000;
+      if (row.sim_time_ns < from_ns || row.sim_time_ns > kDayNs) continue;
+      coldest_k = std::min(coldest_k, row.air_k);
+    }
+  }
+  if (coldest_k < physics::kZeroCelsiusK) {
+    warn(
+        fmt::format("and the air goes down to {:.1f} K: below 273.15 K ice takes the place of "
+                    "water, but neither freezing nor melting nor the rest of plants in winter is "
+                    "modelled",
+                    coldest_k));
+  }
+}
+
 std::vector<std::uint32_t> MaterialLookup::finish(SceneGeometry& geometry) {
   std::vector<std::uint32_t> index_of(library_.size(), 0);
   geometry.materials.push_back(library_[default_position_]);
@@ -148,6 +208,7 @@ std::vector<std::uint32_t> MaterialLookup::finish(SceneGeometry& geometry) {
           library_[i].name, library_[i].uncertainty.empty() ? "" : "; " + library_[i].uncertainty));
     }
   }
+  warn_of_moisture();
   for (std::size_t i = 0; i < mappings_.size(); ++i) {
     mappings_[i].index = index_of[mapping_positions_[i]];
   }

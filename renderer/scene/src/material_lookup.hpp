@@ -35,6 +35,8 @@ class MaterialLookup {
  private:
   /// Notes each key of the object's material_map that no material of the file has.
   void warn_of_unknown_keys(const ObjectDesc& object, const GltfModel& model);
+  /// Notes where the evaporation of materials in use, or of the surroundings, does not hold.
+  void warn_of_moisture();
   [[nodiscard]] bool find(std::string_view name, std::size_t& position) const noexcept;
 
   /// Returns ", did you mean 'NAME'?" with the nearest name of the library, else an empty text.

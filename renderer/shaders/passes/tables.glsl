@@ -15,6 +15,9 @@ vec4 material_resistance_m2k_w(int material) { return texelFetch(material_table,
 // Roughness factor of a material.
 float material_roughness(int material) { return texelFetch(material_table, material * 4 + 3).x; }
 
+// Water of a material: wetness (0: dry), resistance to evaporation in sunlight and without it in s/m.
+vec3 material_water(int material) { return texelFetch(material_table, material * 4 + 3).yzw; }
+
 // Mode 0 or 1 of emit2014: gain at the start, gain at the end, weight, 0.
 vec4 relaxation_mode(int entry, int mode) { return texelFetch(relaxation_table, entry * 2 + mode); }
 

@@ -28,12 +28,17 @@ vec4 spun_up_states(int material, vec3 n) {
   return mix(south, north, weight.y);
 }
 
-// Absorbed flux without the direct sun. `surface` is the first texel of the material.
-float absorbed_indirect_w_m2(vec4 surface, float diffuse_w_m2, float longwave_w_m2, float reflected_w_m2,
-                             float environment_w_m2, float sky_frac) {
-  float short_wave = sky_frac * diffuse_w_m2 + (1.0 - sky_frac) * reflected_w_m2;
+// Short-wave irradiance of a face without the direct sun.
+float shortwave_indirect_w_m2(float diffuse_w_m2, float reflected_w_m2, float sky_frac) {
+  return sky_frac * diffuse_w_m2 + (1.0 - sky_frac) * reflected_w_m2;
+}
+
+// Drive of a face without the direct sun. `surface` is the first texel of the material, `shortwave_w_m2` the
+// irradiance without the direct sun.
+FosterDrive indirect_drive(vec4 surface, float shortwave_w_m2, float longwave_w_m2, float environment_w_m2,
+                           float sky_frac, float film_w_m2_k, float air_offset_k) {
   float long_wave = sky_frac * longwave_w_m2 + (1.0 - sky_frac) * environment_w_m2;
-  return surface.x * short_wave + surface.y * long_wave;
+  return FosterDrive(vec3(surface.x * shortwave_w_m2 + surface.y * long_wave, film_w_m2_k, air_offset_k), vec3(0.0));
 }
 
 void main() {
@@ -78,17 +83,26 @@ void main() {
   vec4 x0 = (flags & EMIT_STEP_FIRST) != 0u ? spun_up_states(material, n) : imageLoad(state_image, px);
   float roughness = material_roughness(material);
   float excess_k = foster_offset_k(x0, s) - step_params.air_start_offset_k;
-  // Set up the drive at both ends: absorbed flux, film coefficient, air temperature.
-  vec3 begin = vec3(absorbed_indirect_w_m2(surface, step_params.diffuse_start_w_m2, step_params.longwave_start_w_m2,
-                                           step_params.reflected_start_w_m2, step_params.environment_start_w_m2,
-                                           sky_frac),
-                    film_w_m2_k(step_params.film_start, n, roughness, excess_k), step_params.air_start_offset_k);
-  vec3 end = vec3(absorbed_indirect_w_m2(surface, step_params.diffuse_end_w_m2, step_params.longwave_end_w_m2,
-                                         step_params.reflected_end_w_m2, step_params.environment_end_w_m2, sky_frac),
-                  film_w_m2_k(step_params.film_end, n, roughness, excess_k), step_params.air_end_offset_k);
+  // Set up the drive at both ends: absorbed flux, film coefficient, air temperature, exchange of water.
+  float short_begin = shortwave_indirect_w_m2(step_params.diffuse_start_w_m2, step_params.reflected_start_w_m2,
+                                              sky_frac);
+  float short_end = shortwave_indirect_w_m2(step_params.diffuse_end_w_m2, step_params.reflected_end_w_m2, sky_frac);
+  FosterDrive begin = indirect_drive(surface, short_begin, step_params.longwave_start_w_m2,
+                                     step_params.environment_start_w_m2, sky_frac,
+                                     film_w_m2_k(step_params.film_start, n, roughness, excess_k),
+                                     step_params.air_start_offset_k);
+  FosterDrive end = indirect_drive(surface, short_end, step_params.longwave_end_w_m2,
+                                   step_params.environment_end_w_m2, sky_frac,
+                                   film_w_m2_k(step_params.film_end, n, roughness, excess_k),
+                                   step_params.air_end_offset_k);
+  vec3 water = material_water(material);
+  begin.moist = moist_drive(water, step_params.moist_start, begin.dry.y, short_begin + sun_frac * max(sun_begin, 0.0));
+  end.moist = moist_drive(water, step_params.moist_end, end.dry.y, short_end + sun_frac * max(sun_end, 0.0));
   float absorbed_frac = surface.x * sun_frac;
-  vec3 lit_begin = begin + vec3(absorbed_frac * max(sun_begin, 0.0), 0.0, 0.0);
-  vec3 lit_end = end + vec3(absorbed_frac * max(sun_end, 0.0), 0.0, 0.0);
+  FosterDrive lit_begin = begin;
+  lit_begin.dry.x += absorbed_frac * max(sun_begin, 0.0);
+  FosterDrive lit_end = end;
+  lit_end.dry.x += absorbed_frac * max(sun_end, 0.0);
 
   // Advance over the whole interval in one step.
   bool clamped = false;
@@ -101,11 +115,11 @@ void main() {
     int steps = 1 << level;
     vec4 coarse = x;
     x = x0;
-    vec3 from = lit_begin;
+    FosterDrive from = lit_begin;
     for (int i = 1; i <= steps; ++i) {
       float f = float(i) / float(steps);
-      vec3 to = mix(begin, end, f);
-      to.x += absorbed_frac * max(mix(sun_begin, sun_end, f), 0.0);
+      FosterDrive to = drive_between(begin, end, f);
+      to.dry.x += absorbed_frac * max(mix(sun_begin, sun_end, f), 0.0);
       x = foster_step(x, from, to, gain_start, gain_end, s, clamped);
       from = to;
     }

@@ -59,9 +59,9 @@ struct MaterialParams {
   float base_offset_k;        // foster: base temperature minus the reference temperature
   vec4 resistance_m2k_w;      // foster: resistance of each mode
   float roughness;            // foster: factor of the forced part of the film
-  float unused0;
-  float unused1;
-  float unused2;
+  float wetness_frac;         // foster: share of the surface's potential evaporation; 0: dry
+  float resistance_s_m;       // foster: resistance to evaporation in sunlight
+  float night_resistance_s_m; // foster: the same without sunlight
 };
 
 // One light frustum of a history interval. Its coordinates are in metres.
@@ -100,6 +100,14 @@ struct FilmParams {
   float unused1;
 };
 
+// Moisture of the air at an instant, the twin of physics::MoistAir (physics.md eq. 47).
+struct MoistAirParams {
+  float vapour_pa;
+  float psychrometric_pa_k;
+  float heat_j_m3_k;
+  float stomata_w_m2;  // short-wave irradiance that opens stomata
+};
+
 // Uniform block of one interval of the thermal history. "start" and "end" are its two ends.
 struct StepParams {
   CascadeParams cascades[EMIT_MAX_CASCADES];
@@ -117,6 +125,8 @@ struct StepParams {
   float environment_end_w_m2;
   FilmParams film_start;          // foster: film coefficient
   FilmParams film_end;
+  MoistAirParams moist_start;     // foster: moisture of the air
+  MoistAirParams moist_end;
   float air_start_offset_k;       // foster: air temperature minus the reference temperature
   float air_end_offset_k;
   float casters_top_m;            // height of the highest caster above the camera
@@ -191,15 +201,18 @@ static_assert(sizeof(FilmParams) == 64);
 EMIT_SHARED_OFFSET(FilmParams, windward_w_m2_k, 16);
 EMIT_SHARED_OFFSET(FilmParams, unstable_quarter, 32);
 EMIT_SHARED_OFFSET(FilmParams, stated_w_m2_k, 48);
-static_assert(sizeof(StepParams) == 80 * EMIT_MAX_CASCADES + 224);
+static_assert(sizeof(MoistAirParams) == 16);
+static_assert(sizeof(StepParams) == 80 * EMIT_MAX_CASCADES + 256);
 EMIT_SHARED_OFFSET(StepParams, to_sun_start, 80 * EMIT_MAX_CASCADES);
 EMIT_SHARED_OFFSET(StepParams, to_sun_end, 80 * EMIT_MAX_CASCADES + 16);
 EMIT_SHARED_OFFSET(StepParams, diffuse_start_w_m2, 80 * EMIT_MAX_CASCADES + 32);
 EMIT_SHARED_OFFSET(StepParams, diffuse_end_w_m2, 80 * EMIT_MAX_CASCADES + 48);
 EMIT_SHARED_OFFSET(StepParams, film_start, 80 * EMIT_MAX_CASCADES + 64);
 EMIT_SHARED_OFFSET(StepParams, film_end, 80 * EMIT_MAX_CASCADES + 128);
-EMIT_SHARED_OFFSET(StepParams, air_start_offset_k, 80 * EMIT_MAX_CASCADES + 192);
-EMIT_SHARED_OFFSET(StepParams, cascade_count, 80 * EMIT_MAX_CASCADES + 208);
+EMIT_SHARED_OFFSET(StepParams, moist_start, 80 * EMIT_MAX_CASCADES + 192);
+EMIT_SHARED_OFFSET(StepParams, moist_end, 80 * EMIT_MAX_CASCADES + 208);
+EMIT_SHARED_OFFSET(StepParams, air_start_offset_k, 80 * EMIT_MAX_CASCADES + 224);
+EMIT_SHARED_OFFSET(StepParams, cascade_count, 80 * EMIT_MAX_CASCADES + 240);
 static_assert(sizeof(RelaxationParams) == 32);
 static_assert(sizeof(BandParams) == 96 + 16 * EMIT_SKY_TILT_VEC4);
 EMIT_SHARED_OFFSET(BandParams, air_radiance_w_m2_sr, 32);

@@ -109,6 +109,8 @@ FosterHeat::FilmSpan FosterHeat::film_over(const SampleAdvance& each,
   FilmSpan out;
   out.begin.air_k = air != nullptr ? air->begin_air_k : forcing.begin.air_k;
   out.end.air_k = air != nullptr ? air->end_air_k : forcing.end.air_k;
+  out.begin.moist = forcing.begin.moist;
+  out.end.moist = forcing.end.moist;
   const double excess_k = reference_k_ + offset_k(sample.material, *each.state) - out.begin.air_k;
   const double roughness = materials_[sample.material].roughness;
   const auto add_face = [&](const glm::dvec3& normal, double share_frac) {
@@ -140,6 +142,7 @@ FosterDrive<double> FosterHeat::absorbed(std::uint32_t material, const FilmDrive
                        materials_[material].emissivity_frac * in.longwave_w_m2 + part.power_w_m2,
       .film_w_m2_k = film.film_w_m2_k,
       .air_offset_k = film.air_k - reference_k_};
+  physics::add_moisture(materials_[material].moisture, film.moist, in.shortwave_w_m2, drive);
   if (part.contact_w_m2_k > 0.0) {
     // Join film and contact to one conductance, to the mean temperature of their far ends.
     const double film_w_m2 = drive.film_w_m2_k * drive.air_offset_k;
@@ -202,12 +205,12 @@ void FosterHeat::begin_column(const SurfaceSample& sample, SampleState& state) c
 }
 
 double FosterHeat::losses_w_m2_k(const SampleAdvance& each, const HeatInterval& interval,
-                                 const FilmDrive& film) const noexcept {
+                                 const FosterDrive<double>& end) const noexcept {
   const SurfaceSample& sample = *each.sample;
   if (sample.covered) return 0.0;
   const double t_k = reference_k_ + offset_k(sample.material, *each.state);
   const double slope_w_m2_k = 4.0 * surfaces_[sample.material].emission_w_m2_k4 * t_k * t_k * t_k +
-                              film.film_w_m2_k + each.drive.part.end.contact_w_m2_k;
+                              end.film_w_m2_k + physics::latent_flux(t_k, end).slope_w_m2_k;
   // The modes answer to a warmer surface too: they take up less.
   const physics::FosterGains<double>& gains = interval.ladders[sample.material].level[0];
   double answer_m2k_w = 0.0;
@@ -219,7 +222,7 @@ double FosterHeat::losses_w_m2_k(const SampleAdvance& each, const HeatInterval& 
 
 ColumnEquations FosterHeat::column_equations(const SampleAdvance& each,
                                              const HeatInterval& interval,
-                                             const FilmDrive& film) const noexcept {
+                                             const FosterDrive<double>& end) const noexcept {
   const SurfaceSample& sample = *each.sample;
   const SampleColumn& column = *each.drive.aside.column;
   const physics::ColumnCells& cells = cells_[sample.material];
@@ -258,7 +261,7 @@ ColumnEquations FosterHeat::column_equations(const SampleAdvance& each,
   }
   // Give the same flux to the cells with neighbours. Where these make the surface warmer than was
   // expected, it takes up less.
-  const double losses_w_m2_k = this->losses_w_m2_k(each, interval, film);
+  const double losses_w_m2_k = this->losses_w_m2_k(each, interval, end);
   out.diagonal_w_m2_k[0] += losses_w_m2_k;
   const double expected_k = each.state->aside_k() + each.drive.aside.change_k;
   out.right_w_m2[0] += into_w_m2 + losses_w_m2_k * (out.alone_k[0] + expected_k);
@@ -299,10 +302,10 @@ BesideColumn FosterHeat::beside(const SurfaceSamples& all, const SampleColumn& c
 }
 
 void FosterHeat::conduct_aside(const SampleAdvance& each, const HeatInterval& interval,
-                               const FilmDrive& film) const noexcept {
+                               const FosterDrive<double>& end) const noexcept {
   const ColumnDrive& aside = each.drive.aside;
   if (aside.beside == nullptr && aside.equations == nullptr) return;
-  ColumnEquations equations = column_equations(each, interval, film);
+  ColumnEquations equations = column_equations(each, interval, end);
   if (aside.equations != nullptr) {
     *aside.equations = equations;
     return;
@@ -412,7 +415,7 @@ void FosterHeat::advance_group(std::span<SampleAdvance> group,
   const SurfaceForcing& at_end = interval.forcing.end;
   // Collect the samples whose own modes the surface balance drives.
   std::array<Incoming, most> ends;
-  std::array<FilmDrive, most> end_films;
+  std::array<FosterDrive<double>, most> end_drives;  // of a covered sample: nothing
   std::array<physics::FosterLane, most> lanes;
   std::size_t count = 0;
   for (std::size_t i = 0; i < group.size(); ++i) {
@@ -420,14 +423,15 @@ void FosterHeat::advance_group(std::span<SampleAdvance> group,
     ends[i] = incoming(*each.sample, each.normal, at_end, each.drive, each.drive.longwave_end_w_m2);
     if (materials_[each.sample->material].prescribed()) continue;
     const FilmSpan film = film_over(each, interval.forcing);
-    end_films[i] = film.end;
-    if (begin_advance(each, interval, ends[i], film, lanes[count])) ++count;
+    if (begin_advance(each, interval, ends[i], film, lanes[count])) {
+      end_drives[i] = lanes[count++].end;
+    }
   }
   physics::foster_advance_all(std::span(lanes).first(count), tolerance_k_);
   for (std::size_t i = 0; i < group.size(); ++i) {
     SampleAdvance& each = group[i];
     count_from_body(each, 1.0);
-    if (each.drive.aside.column != nullptr) conduct_aside(each, interval, end_films[i]);
+    if (each.drive.aside.column != nullptr) conduct_aside(each, interval, end_drives[i]);
     each.output =
         output_of(*each.sample, ends[i], each.drive, offset_k(each.sample->material, *each.state));
   }
@@ -463,10 +467,13 @@ void FosterHeat::step_response(std::uint32_t material, const ResponseConditions&
   const FosterMaterial& m = materials_[material];
   std::ranges::fill(response_m2k_w, 0.0);
   if (m.prescribed() || m.sheet) return;
-  // Linearise the losses: convection and the slope of thermal emission.
+  // Linearise the losses: convection, the slope of thermal emission, and evaporation in the light.
   const double t = around.surface_k;
-  const double h_w_m2_k =
-      around.film_w_m2_k + 4.0 * m.emissivity_frac * physics::kStefanBoltzmannWPerM2K4 * t * t * t;
+  FosterDrive<double> moist{.film_w_m2_k = around.film_w_m2_k};
+  physics::add_moisture(m.moisture, around.moist, physics::kOpenStomataWM2, moist);
+  const double h_w_m2_k = around.film_w_m2_k +
+                          4.0 * m.emissivity_frac * physics::kStefanBoltzmannWPerM2K4 * t * t * t +
+                          physics::latent_flux(t, moist).slope_w_m2_k;
   // Integrate tau x' = r q - x with q = 1 - h sum x by implicit steps: they are stable for any
   // ratio of step and time constant.
   constexpr int kParts = 16;

@@ -133,6 +133,7 @@ class FosterHeat {
   struct FilmDrive {
     double film_w_m2_k = 0.0;
     double air_k = 0.0;
+    physics::MoistAir moist;
   };
   /// Film and air at both ends of an interval.
   struct FilmSpan {
@@ -147,15 +148,15 @@ class FosterHeat {
   /// Returns by how much the flux into a surface falls per kelvin that neighbours add at the end of
   /// an interval, W m-2 K-1.
   [[nodiscard]] double losses_w_m2_k(const SampleAdvance& each, const HeatInterval& interval,
-                                     const FilmDrive& film) const noexcept;
+                                     const physics::FosterDrive<double>& end) const noexcept;
   /// Returns the equations of a column over an interval. The state has its cells at the begin and
   /// its modes at the end.
-  [[nodiscard]] ColumnEquations column_equations(const SampleAdvance& each,
-                                                 const HeatInterval& interval,
-                                                 const FilmDrive& film) const noexcept;
+  [[nodiscard]] ColumnEquations column_equations(
+      const SampleAdvance& each, const HeatInterval& interval,
+      const physics::FosterDrive<double>& end) const noexcept;
   /// Does with the column of a sample what its drive asks for.
   void conduct_aside(const SampleAdvance& each, const HeatInterval& interval,
-                     const FilmDrive& film) const noexcept;
+                     const physics::FosterDrive<double>& end) const noexcept;
   /// Counts the modes of a sample on a body from its interior (`sign` = -1), or from the base of
   /// its material again (+1), physics.md eq. 27. Returns how much warmer the interior is than that
   /// base.
@@ -166,8 +167,8 @@ class FosterHeat {
   /// Returns film and air over an interval. The natural part follows the temperature at its begin.
   [[nodiscard]] FilmSpan film_over(const SampleAdvance& each,
                                    const IntervalForcing& forcing) const noexcept;
-  /// Returns the input of the surface balance: absorbed flux A, film and air, with the heat of a
-  /// part.
+  /// Returns the input of the surface balance: absorbed flux A, film and air, with the exchange of
+  /// water and the heat of a part.
   [[nodiscard]] physics::FosterDrive<double> absorbed(std::uint32_t material, const FilmDrive& film,
                                                       const Incoming& in,
                                                       const PartHeat& part) const noexcept;

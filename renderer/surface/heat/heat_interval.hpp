@@ -111,6 +111,7 @@ struct SampleDrive {
 struct ResponseConditions {
   double film_w_m2_k = 0.0;
   double surface_k = 300.0;
+  physics::MoistAir moist = {};
 };
 
 /// Other face of a sheet: its sample and its input. Its normal is opposite to that of the first

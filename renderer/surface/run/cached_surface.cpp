@@ -212,14 +212,15 @@ physics::Result<void> CachedSurface::save(const SurfaceWarmUp& warm_up, const Sa
 }
 
 void CachedSurface::begin_shade(std::int64_t now_ns, const Inputs& inputs) {
-  const physics::Forcing forcing =
-      inputs.environment.forcing_at(now_ns, inputs.environment.sun_at(now_ns));
+  const physics::SunPosition sun = inputs.environment.sun_at(now_ns);
+  const physics::Forcing forcing = inputs.environment.forcing_at(now_ns, sun);
   // Linearise the response around a sunlit surface in the weather of now.
   constexpr double kSunlitK = 10.0;  // typical difference to the air
   exposure_tiles_.emplace(
       model_->samples, model_->drawn_samples,
       ShadeResponse(heat_, geometry_.materials().size(),
-                    {physics::typical_film_w_m2_k(forcing), forcing.air_k + kSunlitK}),
+                    {physics::typical_film_w_m2_k(forcing), forcing.air_k + kSunlitK,
+                     open_forcing(sun, forcing).moist}),
       inputs.entities.size(), grid_.start_ns(), static_cast<float>(options_.tolerance_k));
   exposure_tiles_->restart(now_ns, inputs.entities);
   entity_shadows_.begin(now_ns, inputs.environment, inputs.entities, geometry_.rays(), workers_);

@@ -44,7 +44,10 @@ bool weather_matters(const SurfaceNode& node, std::int64_t now_ns, const Environ
   double change_w_m2 =
       glm::distance(is.sun_w_m2, glm::mix(taken.begin.sun_w_m2, taken.end.sun_w_m2, way)) +
       off(&SurfaceForcing::diffuse_w_m2) + off(&SurfaceForcing::longwave_w_m2) +
-      film_w_m2_k(is) * off(&SurfaceForcing::air_k) + kFilmK * film_change_w_m2_k;
+      film_w_m2_k(is) * off(&SurfaceForcing::air_k) + kFilmK * film_change_w_m2_k +
+      physics::evaporation_w_m2_pa(film_w_m2_k(is), 1.0, 0.0, is.moist) *
+          std::abs(is.moist.vapour_pa -
+                   between(taken.begin.moist.vapour_pa, taken.end.moist.vapour_pa, way));
   if (weather.environment_stated) {
     change_w_m2 += std::abs(physics::environment_input_w_m2(1.0, weather.environment_k) -
                             between(taken.begin.environment_w_m2, taken.end.environment_w_m2, way));

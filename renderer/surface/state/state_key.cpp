@@ -26,6 +26,7 @@ void add_weather(Fnv64& hash, const physics::WeatherSample& row) {
   add_optional(hash, row.environment_k);
   add_optional(hash, row.film_w_m2_k);
   add_optional(hash, row.wind_from_rad);
+  add_optional(hash, row.relative_humidity_frac);
 }
 
 void add_pose(Fnv64& hash, const physics::Pose& pose) {
@@ -88,6 +89,8 @@ void add_material(Fnv64& hash, const scene::Material& material) {
   add_optional(hash, material.core_conductance_w_m2_k);
   add_optional(hash, material.initial_k);
   add_optional(hash, material.prescribed_k);
+  const physics::MoistSurface moisture = scene::moisture_of(material);
+  add(hash, moisture.wetness_frac, moisture.resistance_s_m, moisture.night_resistance_s_m);
 }
 
 std::uint64_t materials_hash(const scene::ScenarioDesc& scenario,

@@ -61,11 +61,14 @@ physics::FosterDrive<double> drive(const SurfaceForcing& f, const PointView& vie
   const double short_wave_w_m2 = direct_on_face_w_m2(f, view) + view.sky_frac * f.diffuse_w_m2 +
                                  around_frac * f.reflected_w_m2;
   const double long_wave_w_m2 = view.sky_frac * f.longwave_w_m2 + around_frac * f.environment_w_m2;
-  return {.absorbed_w_m2 = material.solar_absorptance_frac * short_wave_w_m2 +
-                           material.emissivity_frac * long_wave_w_m2,
-          .film_w_m2_k = physics::film_w_m2_k(f.film, view.normal, material.roughness,
-                                              physics::kReferenceK + offset_k - f.air_k),
-          .air_offset_k = f.air_k - physics::kReferenceK};
+  physics::FosterDrive<double> out{
+      .absorbed_w_m2 = material.solar_absorptance_frac * short_wave_w_m2 +
+                       material.emissivity_frac * long_wave_w_m2,
+      .film_w_m2_k = physics::film_w_m2_k(f.film, view.normal, material.roughness,
+                                          physics::kReferenceK + offset_k - f.air_k),
+      .air_offset_k = f.air_k - physics::kReferenceK};
+  physics::add_moisture(material.moisture, f.moist, short_wave_w_m2, out);
+  return out;
 }
 
 }  // namespace

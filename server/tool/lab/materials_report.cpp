@@ -64,6 +64,20 @@ std::string with_spread(double value, double half) {
   return half > 0.0 ? fmt::format("{:.2f} +-{:.2f}", value, half) : fmt::format("{:.2f}", value);
 }
 
+/// Wetness and resistances in s/m of a moist material.
+std::string evaporation_text(const Material& material) {
+  const physics::MoistSurface water = scene::moisture_of(material);
+  if (water.dry()) return "-";
+  std::string text = fmt::format("{:.3g} of full", water.wetness_frac);
+  if (water.resistance_s_m > 0.0) {
+    text += fmt::format(", {:.0f} s/m", water.resistance_s_m);
+    if (water.night_resistance_s_m > water.resistance_s_m) {
+      text += fmt::format(", night {:.0f}", water.night_resistance_s_m);
+    }
+  }
+  return text;
+}
+
 std::string share_text(double half) {
   return half > 0.0 ? fmt::format("+-{:.0f} %", 100.0 * half) : "-";
 }
@@ -141,8 +155,9 @@ void add_rows(TextTable& table, std::span<const MaterialEntry> entries) {
   });
   layer_row("inertia of 1st layer",
             [](const Material& m) { return fmt::format("{:.0f}", inertia(m)); });
-  layer_row("dry layers alone",
+  layer_row("layers hold",
             [](const Material& m) { return std::string(m.dry_layers_valid ? "yes" : "no"); });
+  layer_row("evaporation", [](const Material& m) { return evaporation_text(m); });
   layer_row("fit RMS / max K", [](const Material& m) {
     return m.foster_fit ? fmt::format("{:.3f} / {:.3f}", m.foster_fit->rms_k, m.foster_fit->max_k)
                         : std::string("not fitted");
@@ -235,7 +250,7 @@ Plot day_plot(std::span<const MaterialEntry> entries, const std::string& family,
     PlotSeries series{.label = material.name, .points = {}, .line = true, .markers = false};
     if (!material.dry_layers_valid) {
       series.dashed = true;
-      plot.x.label = "local mean solar time, h; dashed: dry layers alone, which are not valid";
+      plot.x.label = "local mean solar time, h; dashed: more than layers, a guide only";
     }
     // A point every 15 minutes is enough for the eye.
     constexpr std::size_t kEvery = 3;
@@ -317,7 +332,7 @@ void print_materials(std::FILE* out, std::span<const MaterialEntry> entries) {
   fmt::print(out, "{}", table.to_string());
   fmt::print(out,
              "inertia: of the first layer, J m-2 K-1 s-1/2, or a given temperature; * is more than "
-             "dry layers: evaporation, melting or stirring matter\n"
+             "layers: melting, stirring or air that passes through matter\n"
              "{} materials; `emit materials NAME` shows layers, sources and a summer's day\n",
              entries.size());
 }

@@ -92,7 +92,8 @@ void add_signs_of_words(const LoggerRecord& record, const MeasuredGround& ground
                                          "which dry layers do not",
                                          snow)});
   }
-  if (ground.material.dry_layers_valid) return;
+  // The ground of a record is computed as dry layers.
+  if (ground.material.dry_layers_valid && scene::moisture_of(ground.material).dry()) return;
   signs.push_back(
       {"material", fmt::format("material '{}' is not valid as dry layers", ground.material.name)});
 }

@@ -100,6 +100,8 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, film_start.upwind);
   EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, film_end.stable_quarter);
   EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, film_end.model_frac);
+  EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, moist_start.vapour_pa);
+  EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, moist_end.heat_j_m3_k);
   EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, air_end_offset_k);
   EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, reflected_end_w_m2);
   EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, relaxation_offset);

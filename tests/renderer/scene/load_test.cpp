@@ -196,6 +196,38 @@ TEST(LoadScene, materials_in_use_that_are_more_than_dry_layers_are_warned_of_by_
               AllOf(HasSubstr("material 'steel'"), HasSubstr("dry_layers_valid = false")));
 }
 
+TEST(LoadScene, evaporation_that_does_not_hold_is_warned_of) {
+  ScenarioDesc scenario = one_triangle(R"({"name":"steel"})", R"(,"material":0)");
+  scenario.thermal.model = ThermalModel::foster;
+  scenario.clear_sky.air_mean_k = 290.0;
+  for (Material& material : scenario.materials) material.surface_resistance_s_m = 70.0;
+  EXPECT_TRUE(load_scene(scenario)->warnings.empty());
+  // The air goes below freezing.
+  scenario.clear_sky.air_mean_k = 276.0;
+  auto scene = load_scene(scenario);
+  ASSERT_EQ(scene->warnings.size(), 1U);
+  EXPECT_THAT(scene->warnings[0], AllOf(HasSubstr("'steel' evaporates"), HasSubstr("270.0 K")));
+  // A table states no humidity, or states it.
+  physics::WeatherSample row;
+  row.air_k = 290.0;
+  scenario.weather = {row};
+  scene = load_scene(scenario);
+  ASSERT_EQ(scene->warnings.size(), 1U);
+  EXPECT_THAT(scene->warnings[0], AllOf(HasSubstr("relative_humidity_frac"), HasSubstr("282.")));
+  scenario.weather[0].relative_humidity_frac = 0.5;
+  EXPECT_TRUE(load_scene(scenario)->warnings.empty());
+  // Soil dries.
+  for (Material& material : scenario.materials) material.surface_resistance_s_m = 0.0;
+  scene = load_scene(scenario);
+  ASSERT_EQ(scene->warnings.size(), 1U);
+  EXPECT_THAT(scene->warnings[0], HasSubstr("drying is not modelled"));
+  // The published model leaves evaporation out.
+  scenario.thermal.model = ThermalModel::emit2014;
+  scene = load_scene(scenario);
+  ASSERT_EQ(scene->warnings.size(), 1U);
+  EXPECT_THAT(scene->warnings[0], HasSubstr("emit2014"));
+}
+
 TEST(LoadScene, unknown_library_names_are_configuration_errors) {
   ScenarioDesc scenario = one_triangle();
   scenario.objects[0].material = "ashpalt";

@@ -24,6 +24,21 @@ TEST(RendererCached, OpenGroundFollowsTheModelInDoubleAlsoBetweenTheNodes) {
   }
 }
 
+TEST(RendererCached, MoistGroundFollowsTheModelInDoubleByDayAndNight) {
+  auto scenario = cached_scenario(write_quads("plane", {ground(50.0, 50.0)}));
+  const double dry_k = open_ground_k(scenario, 7200 * kSecondNs);
+  scenario.materials[0].surface_resistance_s_m = 70.0;
+  scenario.materials[0].night_resistance_s_m = 200.0;
+  Session run(scenario);
+  const auto pose = looking({0.0, -5.0, 5.0}, {0.0, 0.0, 0.0});
+  EXPECT_LT(open_ground_k(scenario, 7200 * kSecondNs), dry_k - 2.0);
+  for (const double seconds : {7200.0, 7203.0, 7239.5, 14'400.0}) {
+    const auto now_ns = static_cast<std::int64_t>(seconds * 1e9);
+    const double expected = open_ground_k(scenario, now_ns);
+    for (const float t : run.frame_k(now_ns, pose)) ASSERT_NEAR(t, expected, 0.02) << seconds;
+  }
+}
+
 /// Wind in which level faces have a film of about 15 W m-2 K-1. In weaker wind the sun warms them
 /// more, and errors of the view grow with it.
 constexpr double kBreezeMS = 4.0;

@@ -102,6 +102,31 @@ TEST(RendererFoster, OpenGroundFollowsTheModelInDoubleWithinTenMillikelvin) {
   }
 }
 
+TEST(RendererFoster, MoistGroundFollowsTheModelInDoubleAndIsCoolerThanDry) {
+  auto scenario = foster_scenario(write_quads("plane", {ground(50.0, 50.0)}));
+  const auto pose = looking({0.0, -5.0, 5.0}, {0.0, 0.0, 0.0});
+  // From the night, when stomata are closed and dew falls, to the day.
+  for (const double hours : {0.0, 3.5, 16.0}) {
+    const auto now_ns = static_cast<std::int64_t>(hours * static_cast<double>(kHourNs));
+    scenario.materials[0].wetness_frac = 0.0;
+    const double dry_k = expected_k(scenario, now_ns, {0.0, 0.0, 1.0});
+    for (const double resistance_s_m : {0.0, 70.0}) {
+      scenario.materials[0].wetness_frac = 1.0;
+      scenario.materials[0].surface_resistance_s_m = resistance_s_m;
+      scenario.materials[0].night_resistance_s_m = 3.0 * resistance_s_m;
+      const double expected = expected_k(scenario, now_ns, {0.0, 0.0, 1.0});
+      double worst_k = 0.0;
+      for (const float t : render_k(scenario, pose, now_ns)) {
+        worst_k = std::max(worst_k, std::abs(t - expected));
+      }
+      EXPECT_LT(worst_k, 0.01) << resistance_s_m << " s/m at " << hours << " h";
+      if (hours == 3.5) {
+        EXPECT_LT(expected, dry_k - 3.0) << resistance_s_m;
+      }
+    }
+  }
+}
+
 TEST(RendererFoster, TiltedFacesFollowTheModelInDouble) {
   // Look at a plate from its front. It is open, so its obscurance is that of flat ground. No plate
   // turns to or from the sun within an interval, where the clamped cosine of the shader would be

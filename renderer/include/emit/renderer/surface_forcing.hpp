@@ -7,6 +7,7 @@
 
 #include "emit/physics/air_film.hpp"
 #include "emit/physics/error.hpp"
+#include "emit/physics/evaporation.hpp"
 #include "emit/physics/foster.hpp"
 #include "emit/scene/scene_desc.hpp"
 
@@ -25,6 +26,7 @@ struct SurfaceForcing {
   physics::AirFlow flow;          ///< air past what stands still
   physics::AirFilm film;          ///< film of scenery in that flow
   double air_k = 0.0;             ///< air temperature
+  physics::MoistAir moist;        ///< moisture of the air
 };
 /// Forcing over an interval. It goes linearly from begin to end.
 struct IntervalForcing {
@@ -49,9 +51,10 @@ struct FosterMaterial {
   double base_k = 0.0;
   double initial_k = 0.0;
   double prescribed_k = 0.0;
-  double roughness = 1.0;  ///< factor of the forced part of the film (physics.md eq. 34)
-  bool sheet = false;      ///< driven by the mean of the fluxes that its two faces receive
-  bool body = false;       ///< the base is the interior of a body, which starts at base_k
+  double roughness = 1.0;          ///< factor of the forced part of the film (physics.md eq. 34)
+  physics::MoistSurface moisture;  ///< exchange of water with the air
+  bool sheet = false;              ///< driven by the mean of the fluxes that its two faces receive
+  bool body = false;               ///< the base is the interior of a body, which starts at base_k
   /// Layers in which heat moves sideways; empty for sheets and for prescribed temperatures.
   std::vector<physics::StackLayer> layers;
   physics::FosterState<double> base_shares{};  ///< shares c_i of the modes in a change of the base

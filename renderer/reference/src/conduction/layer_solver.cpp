@@ -37,12 +37,21 @@ struct BalanceFace {
     const FaceState& a = segment.start;
     const FaceState& b = segment.end;
     const auto convection_w_m2 = [&](double k) {
-      return mix(a.film_at_w_m2_k(k), b.film_at_w_m2_k(k)) * (mix(a.air_k, b.air_k) - k);
+      const double h_w_m2_k = mix(a.film_at_w_m2_k(k), b.film_at_w_m2_k(k));
+      const double air_k = mix(a.air_k, b.air_k);
+      const double sensible_w_m2 = h_w_m2_k * (air_k - k);
+      if (!a.moisture || !b.moisture || !(h_w_m2_k > 0.0)) return sensible_w_m2;
+      const FaceMoisture now{
+          .vapour_pa = mix(a.moisture->vapour_pa, b.moisture->vapour_pa),
+          .pressure_pa = mix(a.moisture->pressure_pa, b.moisture->pressure_pa),
+          .wetness_frac = a.moisture->wetness_frac,
+          .resistance_s_m = mix(a.moisture->resistance_s_m, b.moisture->resistance_s_m)};
+      return sensible_w_m2 - now.latent_w_m2(k, air_k, h_w_m2_k);
     };
-    // Take the slope of a film that follows the temperature by differences.
+    // Take the slope of what follows the temperature by differences.
     constexpr double kDifferenceK = 0.01;
     const double slope_w_m2_k =
-        a.film || b.film
+        a.film || b.film || a.moisture
             ? (convection_w_m2(face_k + kDifferenceK) - convection_w_m2(face_k - kDifferenceK)) /
                   (2.0 * kDifferenceK)
             : -mix(a.film_w_m2_k, b.film_w_m2_k);
@@ -90,6 +99,38 @@ void substitute(const LayerSolver::Factors& factors, std::vector<double>& x) noe
 }
 
 }  // namespace
+
+double saturation_pa(double temperature_k) noexcept {
+  if (temperature_k < physics::kZeroCelsiusK) {
+    const double t = std::max(temperature_k, 110.0);
+    return std::exp(9.550426 - 5723.265 / t + 3.53068 * std::log(t) - 0.00728332 * t);
+  }
+  constexpr double kCriticalK = 647.096;
+  constexpr double kCriticalPa = 22.064e6;
+  const double t = std::min(temperature_k, 640.0);
+  const double v = 1.0 - t / kCriticalK;
+  const double root = std::sqrt(v);
+  const double cube = v * v * v;
+  return kCriticalPa * std::exp(kCriticalK / t *
+                                (-7.85951783 * v + 1.84408259 * v * root - 11.7866497 * cube +
+                                 22.6807411 * cube * root - 15.9618719 * cube * v +
+                                 1.80122502 * cube * cube * v * root));
+}
+
+double FaceMoisture::latent_w_m2(double face_k, double air_k, double film_w_m2_k) const noexcept {
+  constexpr double kGasJKgK = 287.05;
+  constexpr double kHeatJKgK = 1013.0;
+  constexpr double kVapourRatio = 0.622;
+  const double density_kg_m3 = pressure_pa / (kGasJKgK * air_k);
+  const double film_s_m = density_kg_m3 * kHeatJKgK / film_w_m2_k;
+  const double excess_pa = saturation_pa(face_k) - vapour_pa;
+  const bool dew = excess_pa < 0.0;
+  const double share = dew ? 1.0 : wetness_frac;
+  const double water_kg_m2_s = share * density_kg_m3 * kVapourRatio * excess_pa / pressure_pa /
+                               (film_s_m + (dew ? 0.0 : resistance_s_m));
+  const double latent_j_kg = 2.501e6 - 2361.0 * (air_k - physics::kZeroCelsiusK);
+  return latent_j_kg * water_kg_m2_s;
+}
 
 LayerSolver::LayerSolver(const LayerMesh& mesh, const StepOptions& options)
     : mesh_(&mesh), options_(options), unknowns_(mesh.nodes() - (mesh.base_held() ? 1 : 0)) {
@@ -506,9 +547,16 @@ void face_history(LayerSolver& solver, std::span<const ProfilePoint> profile,
           if (film && b.face.film) {
             film->air = physics::between_films(a.face.film->air, b.face.film->air, f);
           }
+          std::optional<FaceMoisture> moisture = a.face.moisture;
+          if (moisture && b.face.moisture) {
+            moisture->vapour_pa = mix(a.face.moisture->vapour_pa, b.face.moisture->vapour_pa);
+            moisture->pressure_pa = mix(a.face.moisture->pressure_pa, b.face.moisture->pressure_pa);
+            moisture->resistance_s_m =
+                mix(a.face.moisture->resistance_s_m, b.face.moisture->resistance_s_m);
+          }
           return FaceState{mix(a.face.absorbed_w_m2, b.face.absorbed_w_m2),
                            mix(a.face.film_w_m2_k, b.face.film_w_m2_k),
-                           mix(a.face.air_k, b.face.air_k), film};
+                           mix(a.face.air_k, b.face.air_k), film, moisture};
         };
         segment.start = now_s == a.time_s ? a.face : at(now_s);
         segment.end = segment.end_s == b.time_s ? b.face : at(segment.end_s);

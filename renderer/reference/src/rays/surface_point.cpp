@@ -18,7 +18,8 @@ ClimateNode mix(const ClimateNode& a, const ClimateNode& b, double f) noexcept {
           at(a.longwave_down_w_m2, b.longwave_down_w_m2),
           at(a.air_k, b.air_k),
           physics::between_flows(a.flow, b.flow, f),
-          at(a.surroundings_k, b.surroundings_k)};
+          at(a.surroundings_k, b.surroundings_k),
+          at(a.vapour_pa, b.vapour_pa)};
 }
 
 /// Interpolates a view.
@@ -99,6 +100,10 @@ void PointSolver::advance(const SurfaceOptics& surface, const Views& views,
       const FaceState other =
           face_state(climate, behind, value_at(views.back, time_ns, back_row_), reflectance_frac);
       face.absorbed_w_m2 = 0.5 * (face.absorbed_w_m2 + other.absorbed_w_m2);
+      if (face.moisture) {
+        face.moisture->resistance_s_m =
+            0.5 * (face.moisture->resistance_s_m + other.moisture->resistance_s_m);
+      }
       return face;
     };
     // Solve the stretch, which is linear in time.
@@ -131,8 +136,12 @@ void PointSolver::run(const glm::dvec3& normal, const Views& views,
     std::fill(out_k.begin(), out_k.end(), *material_->prescribed_k);
     return;
   }
-  const SurfaceOptics surface{normal, material_->solar_absorptance_frac, material_->emissivity_frac,
-                              scene::roughness_factor(material_->roughness), material_->sheet};
+  const SurfaceOptics surface{normal,
+                              material_->solar_absorptance_frac,
+                              material_->emissivity_frac,
+                              scene::roughness_factor(material_->roughness),
+                              material_->sheet,
+                              scene::moisture_of(*material_)};
   // Repeat the spin-up only for another orientation.
   if (!has_spin_up_ || normal != spin_up_normal_) spin_up(surface);
   const std::int64_t start_ns = climate_->history_start_ns();

@@ -11,16 +11,18 @@
 #include "emit/physics/error.hpp"
 #include "emit/physics/lanes.hpp"
 #include "emit/physics/relaxation.hpp"
+#include "emit/physics/saturation.hpp"
 
 /// Heat conduction into a stack of layers, modelled by a few flux-driven states (a Foster network):
 ///
 ///   T = T_base + sum x_i,   tau_i x_i' = r_i q - x_i,   sum r_i = sum d/lambda
-///   q = A + h (T_air - T) - e T^4                           (physics.md eq. 16-18)
+///   q = A + h (T_air - T) - e T^4 - k (e_s(T) - e_a)        (physics.md eq. 16-18, 47)
 ///
 /// x_i are kelvins above the base, q is the net flux into the solid and A is the absorbed flux. A
 /// step is implicit in the surface balance and exact for q linear over the step. The new
 /// temperature is the root of the quartic of physics.md eq. 4, with P in place of the core
 /// temperature and 1/R in place of its conductance. A steady state is that of the same equation.
+/// The last term is there for moist surfaces alone; the quartic has its tangent.
 /// shaders/lib/foster.glsl is the float32 twin of foster_step().
 namespace emit::physics {
 
@@ -126,6 +128,10 @@ struct FosterDrive {
   Real absorbed_w_m2 = 0;  ///< A: absorbed short-wave and long-wave flux
   Real film_w_m2_k = 0;    ///< h
   Real air_offset_k = 0;
+  // Exchange of water with the air (evaporation.hpp). All are 0 for a dry surface.
+  Real evaporation_w_m2_pa = 0;  ///< k where e_s(T) is above e_a
+  Real dew_w_m2_pa = 0;          ///< k where it is below
+  Real vapour_pa = 0;            ///< e_a
 };
 
 /// Properties of one surface that stay the same over its steps.
@@ -137,6 +143,26 @@ struct FosterSurface {
   Real reference_k = 0;
 };
 
+/// Latent heat that leaves a surface at a temperature, W m-2, and its slope in W m-2 K-1, which is
+/// never below 0.
+template <class Real>
+struct LatentFlux {
+  Real flux_w_m2 = 0;
+  Real slope_w_m2_k = 0;
+};
+/// Returns the latent heat by physics.md eq. 47. It is 0 for a dry surface.
+template <class Real>
+[[nodiscard]] LatentFlux<Real> latent_flux(const Real& temperature_k,
+                                           const FosterDrive<Real>& d) noexcept {
+  // Most surfaces are dry: spare them the exponential.
+  if (none(Mask<Real>(d.dew_w_m2_pa > Real(0)))) return {};
+  const Saturation<Real> water = saturation(temperature_k);
+  const Real excess_pa = water.pressure_pa - d.vapour_pa;
+  const Real k_w_m2_pa =
+      choose(Mask<Real>(excess_pa > Real(0)), d.evaporation_w_m2_pa, d.dew_w_m2_pa);
+  return {k_w_m2_pa * excess_pa, k_w_m2_pa * water.slope_pa_k};
+}
+
 /// Returns the surface temperature as an offset from the surface's reference, K.
 template <class Real>
 [[nodiscard]] constexpr Real foster_offset_k(const FosterState<Real>& x,
@@ -144,14 +170,31 @@ template <class Real>
   return s.base_offset_k + ((x[0] + x[1]) + (x[2] + x[3]));
 }
 
-/// Returns the net flux into the solid at a surface temperature, W/m2 (physics.md eq. 16).
+/// Returns the net flux into the solid at a surface temperature, W/m2 (physics.md eq. 16 and 47).
 template <class Real>
-[[nodiscard]] constexpr Real foster_flux_w_m2(Real offset_k, const FosterDrive<Real>& d,
-                                              const FosterSurface<Real>& s) noexcept {
+[[nodiscard]] Real foster_flux_w_m2(const Real& offset_k, const FosterDrive<Real>& d,
+                                    const FosterSurface<Real>& s) noexcept {
   const Real t = s.reference_k + offset_k;
   const Real t2 = t * t;
   return d.absorbed_w_m2 + d.film_w_m2_k * (d.air_offset_k - offset_k) -
-         s.emission_w_m2_k4 * t2 * t2;
+         s.emission_w_m2_k4 * t2 * t2 - latent_flux(t, d).flux_w_m2;
+}
+
+/// Returns the flags of moist surfaces whose flux at the start of a step, if it held over the whole
+/// step, would carry them past their balance by more than they are off. Half of such a flux rings
+/// from step to step, and grows where a hot surface evaporates more steeply than a cold one.
+template <class Real>
+[[nodiscard]] Mask<Real> foster_rings(const FosterState<Real>& x, const Real& q_begin,
+                                      const FosterDrive<Real>& begin, const FosterGains<Real>& g,
+                                      const FosterSurface<Real>& s) noexcept {
+  const Mask<Real> moist = begin.dew_w_m2_pa > Real(0);
+  if (none(moist)) return moist;
+  Real offset_k = foster_offset_k(x, s);
+  for (std::size_t i = 0; i < kMaxFosterModes; ++i) {
+    offset_k += (s.resistance_m2k_w[i] * q_begin - x[i]) * (g.start_frac[i] + g.end_frac[i]);
+  }
+  const Real q_there = foster_flux_w_m2(offset_k, begin, s);
+  return both(moist, Mask<Real>((q_there + q_begin) * q_begin < Real(0)));
 }
 
 /// Advances `x` by one step whose drive goes from `begin` to `end` (physics.md eq. 18). The
@@ -165,30 +208,41 @@ Mask<Real> foster_step(FosterState<Real>& x, const FosterDrive<Real>& begin,
                        const FosterSurface<Real>& s) noexcept {
   // Advance the states with the flux at the start alone. P of physics.md eq. 18 is the temperature
   // that this gives, R is what each W/m2 of the flux at the end adds to it.
-  const Real q_begin = foster_flux_w_m2(foster_offset_k(x, s), begin, s);
+  const Real begin_offset_k = foster_offset_k(x, s);
+  const Real q_begin = foster_flux_w_m2(begin_offset_k, begin, s);
+  // Let the flux at the end count for the whole step where that at the start would ring.
+  const Mask<Real> rings = foster_rings(x, q_begin, begin, g, s);
+  FosterState<Real> end_frac;
   FosterState<Real> partial;  // new states before the flux at the end is added
   Real p_k = s.base_offset_k;
   Real r_m2k_w = 0;
   for (std::size_t i = 0; i < kMaxFosterModes; ++i) {
+    const Real start_frac = choose(rings, Real(0), g.start_frac[i]);
+    end_frac[i] = choose(rings, g.start_frac[i] + g.end_frac[i], g.end_frac[i]);
     partial[i] =
-        x[i] + ((s.resistance_m2k_w[i] * q_begin - x[i]) * g.start_frac[i] - x[i] * g.end_frac[i]);
+        x[i] + ((s.resistance_m2k_w[i] * q_begin - x[i]) * start_frac - x[i] * end_frac[i]);
     p_k += partial[i];
-    r_m2k_w += s.resistance_m2k_w[i] * g.end_frac[i];
+    r_m2k_w += s.resistance_m2k_w[i] * end_frac[i];
   }
   const Mask<Real> lasts = r_m2k_w > Real(0);
   if (none(lasts)) return Mask<Real>(false);  // the step has no length
   const Real conductance = Real(1) / r_m2k_w;
+  // Take the latent heat along its tangent at the start, so that the balance stays a quartic.
+  const Real begin_k = s.reference_k + begin_offset_k;
+  const LatentFlux<Real> latent = latent_flux(begin_k, end);
   // Solve physics.md eq. 18 for the temperature at the end of the step.
-  const SurfaceBalance<Real> balance{s.emission_w_m2_k4, end.film_w_m2_k + conductance,
-                                     end.absorbed_w_m2 +
-                                         end.film_w_m2_k * (s.reference_k + end.air_offset_k) +
-                                         conductance * (s.reference_k + p_k)};
+  const SurfaceBalance<Real> balance{
+      s.emission_w_m2_k4, end.film_w_m2_k + conductance + latent.slope_w_m2_k,
+      end.absorbed_w_m2 + end.film_w_m2_k * (s.reference_k + end.air_offset_k) +
+          conductance * (s.reference_k + p_k) + (latent.slope_w_m2_k * begin_k - latent.flux_w_m2)};
   const EquilibriumResult<Real> root = solve_equilibrium(balance);
   // Take one Newton step on offsets. A temperature in kelvin resolves only 3e-5 K in float32, which
-  // a short step (small R) would turn into a wrong flux.
+  // a short step (small R) would turn into a wrong flux. The step also leads from the tangent of
+  // the latent heat to its curve.
   Real offset_k = root.temperature_k - s.reference_k;
   const Real t3 = root.temperature_k * root.temperature_k * root.temperature_k;
-  const Real slope = Real(4) * s.emission_w_m2_k4 * t3 + end.film_w_m2_k;
+  const Real slope = Real(4) * s.emission_w_m2_k4 * t3 + end.film_w_m2_k +
+                     latent_flux(root.temperature_k, end).slope_w_m2_k;
   const Real polished_k =
       offset_k +
       (foster_flux_w_m2(offset_k, end, s) - (offset_k - p_k) * conductance) / (slope + conductance);
@@ -198,7 +252,7 @@ Mask<Real> foster_step(FosterState<Real>& x, const FosterDrive<Real>& begin,
   const Real q_end =
       choose(steep, (offset_k - p_k) * conductance, foster_flux_w_m2(offset_k, end, s));
   for (std::size_t i = 0; i < kMaxFosterModes; ++i) {
-    x[i] = choose(lasts, partial[i] + s.resistance_m2k_w[i] * q_end * g.end_frac[i], x[i]);
+    x[i] = choose(lasts, partial[i] + s.resistance_m2k_w[i] * q_end * end_frac[i], x[i]);
   }
   return both(root.clamped, lasts);
 }
@@ -227,7 +281,10 @@ template <class Real>
                                                const FosterDrive<Real>& b, Real f) noexcept {
   return {a.absorbed_w_m2 + (b.absorbed_w_m2 - a.absorbed_w_m2) * f,
           a.film_w_m2_k + (b.film_w_m2_k - a.film_w_m2_k) * f,
-          a.air_offset_k + (b.air_offset_k - a.air_offset_k) * f};
+          a.air_offset_k + (b.air_offset_k - a.air_offset_k) * f,
+          a.evaporation_w_m2_pa + (b.evaporation_w_m2_pa - a.evaporation_w_m2_pa) * f,
+          a.dew_w_m2_pa + (b.dew_w_m2_pa - a.dew_w_m2_pa) * f,
+          a.vapour_pa + (b.vapour_pa - a.vapour_pa) * f};
 }
 
 /// Finest split of an interval. It has 2^kMaxFosterLevel equal steps.

@@ -25,6 +25,8 @@ struct WeatherSample {
   /// Direction from which the wind blows, clockwise from north. If absent, all directions count
   /// alike.
   std::optional<double> wind_from_rad = std::nullopt;
+  /// Relative humidity over water, 0..1. If absent, with_vapour() says what counts.
+  std::optional<double> relative_humidity_frac = std::nullopt;
 };
 
 /// Parameters of the clear-sky models.
@@ -60,12 +62,21 @@ struct Forcing {
   double gust_m_s = 0.0;
   double height_m = 0.0;  ///< of the place
   double cloud_frac = 0.0;
+  /// Vapour pressure that the weather states, multiplied by its share, and that share: between a
+  /// row that states the humidity and one that does not, the share goes from 1 to 0.
+  double stated_vapour_pa = 0.0;
+  double stated_vapour_frac = 0.0;
+  double vapour_pa = 0.0;  ///< of the air, once with_vapour() has set it
 };
+
+/// Returns the forcing with its vapour pressure: the stated one, and for the rest that of the dew
+/// point `usual_dew_point_k`, as far as the air can hold it.
+[[nodiscard]] Forcing with_vapour(Forcing forcing, double usual_dew_point_k) noexcept;
 
 /// Returns the forcing at a time: linear between rows, constant before the first and after the
 /// last. Two rows with the same time make a jump, and the later row holds from that instant on. If
 /// only one of two neighbours states `environment_k`, the other one takes it from its model. Height
-/// and gusts are 0, see at_place().
+/// and gusts are 0, see at_place(), and so is the vapour pressure, see with_vapour().
 /// @pre rows is not empty and ascending in time.
 [[nodiscard]] Forcing forcing_from_rows(std::span<const WeatherSample> rows,
                                         std::int64_t sim_time_ns) noexcept;

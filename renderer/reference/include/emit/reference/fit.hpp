@@ -27,6 +27,8 @@ struct GroundForcing {
   double longwave_w_m2 = 0.0;
   double film_w_m2_k = 0.0;
   double air_k = 0.0;
+  double vapour_pa = 0.0;  ///< of the air, for materials that evaporate (foster alone)
+  double pressure_pa = 101'325.0;
 };
 
 /// Returns the forcing of a scenario every `step_s` between two simulated times, from its weather

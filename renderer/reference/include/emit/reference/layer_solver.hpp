@@ -27,13 +27,30 @@ struct FaceFilm {
   }
 };
 
+/// Exchange of water between a face and the air, at an instant.
+struct FaceMoisture {
+  double vapour_pa = 0.0;  ///< of the air
+  double pressure_pa = 101'325.0;
+  double wetness_frac = 1.0;    ///< share of the evaporation of a face that is moist all over
+  double resistance_s_m = 0.0;  ///< of the surface, under the light of that instant
+
+  /// Returns the latent heat that leaves the face, W m-2, without any linearisation: the mass of
+  /// water through both resistances times its heat of vaporisation. Dew forms on the whole face,
+  /// without its resistance. @pre film_w_m2_k > 0 and air_k > 0
+  [[nodiscard]] double latent_w_m2(double face_k, double air_k, double film_w_m2_k) const noexcept;
+};
+/// Returns the saturation pressure of water vapour, Pa: over water by Wagner and Pruss (1993), over
+/// ice below 273.15 K by Murphy and Koop (2005). Valid for 110 to 640 K.
+[[nodiscard]] double saturation_pa(double temperature_k) noexcept;
+
 /// Values that act on the face at an instant. The flux into the solid is q = absorbed + film (air -
-/// T) - emissivity sigma T^4, W/m2.
+/// T) - emissivity sigma T^4 - latent heat, W/m2.
 struct FaceState {
   double absorbed_w_m2 = 0.0;
   double film_w_m2_k = 0.0;  ///< counts if `film` is absent
   double air_k = 0.0;
   std::optional<FaceFilm> film = std::nullopt;
+  std::optional<FaceMoisture> moisture = std::nullopt;  ///< absent: the face is dry
 
   /// Returns the film coefficient at a temperature of the face.
   [[nodiscard]] double film_at_w_m2_k(double face_k) const noexcept {

@@ -9,6 +9,7 @@
 
 #include "emit/physics/air_film.hpp"
 #include "emit/physics/error.hpp"
+#include "emit/physics/evaporation.hpp"
 #include "emit/reference/layer_solver.hpp"
 #include "emit/scene/scene_desc.hpp"
 
@@ -17,6 +18,7 @@
 ///
 ///   q = a_s [DNI f_sun max(0, N.L) + f_sky E_dif + G_scene + f_ground rho GHI]
 ///       + eps [f_sky L_down + L_scene + f_ground sigma T_env^4] - eps sigma T^4 + h (T_air - T)
+///       - latent heat (FaceMoisture)
 ///
 /// h is that of physics.md eq. 34 at the face's temperature T.
 /// GHI = DNI sin(elevation) + E_dif. f_ground = 1 - f_sky - f_scene is the share that lies below
@@ -34,6 +36,7 @@ struct ClimateNode {
   double air_k = 0.0;
   physics::AirFlow flow = {};  ///< past what stands still
   double surroundings_k = 0.0;
+  double vapour_pa = 0.0;  ///< of the air
 };
 
 /// Options of SurfaceClimate::create().
@@ -93,7 +96,12 @@ struct SurfaceOptics {
   double emissivity_frac = 0.0;
   double roughness = 1.0;   ///< factor of the forced part of the film
   bool both_sides = false;  ///< the film is the mean of both faces of a sheet
+  physics::MoistSurface moisture = {};
 };
+/// Returns the resistance of a moist surface under a short-wave irradiance, s m-1: its inverse goes
+/// linearly from that of the night to that of the day, which counts from 100 W/m2 on.
+[[nodiscard]] double light_resistance_s_m(const physics::MoistSurface& moisture,
+                                          double shortwave_w_m2) noexcept;
 
 /// Returns the terms of the balance that do not depend on the surface temperature. RT-safe.
 [[nodiscard]] FaceState face_state(const ClimateNode& climate, const SurfaceOptics& surface,

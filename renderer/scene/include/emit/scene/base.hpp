@@ -9,6 +9,10 @@ namespace emit::scene {
 /// weather table, or of the clear-sky models without one.
 [[nodiscard]] double mean_air_k(const ScenarioDesc& scenario) noexcept;
 
+/// Returns the dew point of the air where the weather states no humidity, K: that of the clear-sky
+/// models, or beside a weather table that of 60 % at mean_air_k().
+[[nodiscard]] double usual_dew_point_k(const ScenarioDesc& scenario) noexcept;
+
 /// Returns Material::base_k for the kind of base of a material whose number the user does not
 /// state: of the ground at the depth of its layers by place, date and weather, or mean_air_k().
 [[nodiscard]] double base_temperature_k(const Material& material, const ScenarioDesc& scenario);

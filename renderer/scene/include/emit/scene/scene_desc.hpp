@@ -11,6 +11,7 @@
 #include "emit/physics/air_film.hpp"
 #include "emit/physics/air_model.hpp"
 #include "emit/physics/atmosphere_table.hpp"
+#include "emit/physics/evaporation.hpp"
 #include "emit/physics/frames.hpp"
 #include "emit/physics/weather.hpp"
 #include "emit/scene/channel_output.hpp"
@@ -140,6 +141,10 @@ struct Material {
   /// False for materials in which heat does not move through dry layers alone, but by evaporation,
   /// melting or stirring.
   bool dry_layers_valid = true;
+  // foster: evaporation (physics.md eq. 47). A material with the first or the second one is moist.
+  std::optional<double> wetness_frac;            ///< 0..1; absent: 1
+  std::optional<double> surface_resistance_s_m;  ///< in sunlight; absent: 0
+  std::optional<double> night_resistance_s_m;    ///< absent: the same as in sunlight
   /// Temperature of a hot part or another emitter that takes no part in the thermal simulation.
   std::optional<double> prescribed_k;
   /// True for both faces of a thin body, whose layers are half of it over an insulated middle (see
@@ -156,6 +161,17 @@ struct Material {
     return base == BaseKind::body && !base_stated && !prescribed_k && !sheet;
   }
 };
+
+/// Returns how a material gives water to the air; dry if it states nothing or has a prescribed
+/// temperature.
+[[nodiscard]] inline physics::MoistSurface moisture_of(const Material& material) noexcept {
+  const bool stated = material.wetness_frac || material.surface_resistance_s_m;
+  if (!stated || material.prescribed_k) return {};
+  const double resistance_s_m = material.surface_resistance_s_m.value_or(0.0);
+  return {.wetness_frac = material.wetness_frac.value_or(1.0),
+          .resistance_s_m = resistance_s_m,
+          .night_resistance_s_m = material.night_resistance_s_m.value_or(resistance_s_m)};
+}
 
 /// One node of a trajectory: linear in position, slerp in attitude; `on` holds until the next one.
 struct Keyframe {
