@@ -50,6 +50,10 @@ FILES = {
             "The same on a GPU, without the axis of triangles. A frame of a third of a millisecond shows what the "
             "processor does for every object.",
             "emit bench scaling --method cached --axis steps --axis pixels --axis objects --axis samples"),
+        "uncertainty": (
+            "What the uncertainty of each input does to the surfaces of a picture, with each input at both ends of its "
+            "range and all others as they are.",
+            "emit bench uncertainty block-on-road"),
         "gas": (
             "Frame time of the scenario `decoys` with each kind of gas, beside the same scene without gas.",
             "emit bench gas"),
@@ -203,6 +207,16 @@ def gas_tables(rows):
                  ("ratio", field("ratio")), ("spread", field("self_ratio_spread"))], rows)
 
 
+def uncertainty_tables(rows):
+    for row in rows:
+        flat = [{"band": row["band"], **{k: i[k] for k in ("input", "range", "source")},
+                 "low": i["low"]["mean_k"], "high": i["high"]["mean_k"],
+                 "rms": max(i["low"]["rms_k"], i["high"]["rms_k"])} for i in row["inputs"]]
+        yield table([("band", field("band")), ("input", field("input")), ("range", field("range")),
+                     ("low end, mean K", field("low")), ("high end, mean K", field("high")), ("RMS, K", field("rms")),
+                     ("source of the range", field("source"))], flat)
+
+
 def turn_tables(rows):
     yield table([("case", field("case")), ("budget, ms", field("budget_ms")), ("frame, ms", field("frame_ms_median")),
                  ("longest, ms", field("frame_ms_max_median_of_runs")), ("longest / median", field("ratio")),
@@ -267,7 +281,8 @@ def isolation_tables(rows):
 
 
 TABLES = {"paper": paper_tables, "error-vs-time": error_tables, "thermal-truth": truth_tables,
-          "subpixel": subpixel_tables, "scaling": scaling_tables, "crowd": crowd_tables, "gas": gas_tables, "turn": turn_tables,
+          "subpixel": subpixel_tables, "scaling": scaling_tables, "crowd": crowd_tables, "gas": gas_tables,
+          "uncertainty": uncertainty_tables, "turn": turn_tables,
           "budget": budget_tables, "live": live_tables, "stream": stream_tables, "isolation": isolation_tables}
 
 

@@ -26,7 +26,8 @@ Environment::Environment(const scene::ScenarioDesc& scenario)
       epoch_utc_ns_(scenario.epoch_utc_ns),
       clear_sky_(scenario.clear_sky),
       table_(scenario.weather),
-      usual_dew_point_k_(scene::usual_dew_point_k(scenario)) {
+      usual_dew_point_k_(scene::usual_dew_point_k(scenario)),
+      film_factor_(scenario.thermal.film_factor) {
   live_.reserve(kMaxLiveSamples);
   changes_ns_.reserve(kMaxLiveSamples);
   revisions_.reserve(kMaxLiveSamples);
@@ -83,13 +84,18 @@ physics::Forcing Environment::forcing_at(std::int64_t sim_time_ns,
   const auto after = std::upper_bound(
       live_.begin(), live_.end(), sim_time_ns,
       [](std::int64_t t, const physics::WeatherSample& row) { return t < row.sim_time_ns; });
+  physics::Forcing forcing;
   if (after == live_.begin() && table_.empty()) {
-    return physics::forcing_from_clear_sky(clear_sky_, place_, sun, epoch_utc_ns_ + sim_time_ns);
+    forcing =
+        physics::forcing_from_clear_sky(clear_sky_, place_, sun, epoch_utc_ns_ + sim_time_ns);
+  } else {
+    forcing = after != live_.begin()
+                  ? physics::forcing_from_rows({&*(after - 1), 1}, sim_time_ns)
+                  : physics::forcing_from_rows(table_, sim_time_ns);
+    forcing = physics::with_vapour(physics::at_place(forcing, place_, sun), usual_dew_point_k_);
   }
-  const physics::Forcing forcing = after != live_.begin()
-                                       ? physics::forcing_from_rows({&*(after - 1), 1}, sim_time_ns)
-                                       : physics::forcing_from_rows(table_, sim_time_ns);
-  return physics::with_vapour(physics::at_place(forcing, place_, sun), usual_dew_point_k_);
+  forcing.film_factor = film_factor_;
+  return forcing;
 }
 
 }  // namespace emit::renderer

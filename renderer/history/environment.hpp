@@ -53,6 +53,7 @@ class Environment {
   physics::ClearSky clear_sky_;
   std::vector<physics::WeatherSample> table_;
   double usual_dew_point_k_ = 0.0;  ///< where the weather states no humidity
+  double film_factor_ = 1.0;
   std::vector<physics::WeatherSample> live_;
   std::vector<std::int64_t> changes_ns_;  ///< times of the rows of live_
   std::vector<std::uint64_t> revisions_;  ///< revisions of the rows of live_, ascending

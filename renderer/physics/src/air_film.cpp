@@ -100,6 +100,7 @@ AirFlow air_flow(const Forcing& weather) noexcept {
       std::hypot(weather.wind_m_s * std::sqrt(1.0 - known * known), weather.gust_m_s);
   flow.stated_w_m2_k = weather.stated_film_w_m2_k;
   flow.stated_frac = weather.stated_film_frac;
+  flow.film_factor = weather.film_factor;
   return flow;
 }
 
@@ -110,7 +111,8 @@ AirFlow between_flows(const AirFlow& a, const AirFlow& b, double f) noexcept {
           a.flow_m_s + f * (b.flow_m_s - a.flow_m_s),
           mix(a.undirected_m_s, b.undirected_m_s),
           mix(a.stated_w_m2_k, b.stated_w_m2_k),
-          mix(a.stated_frac, b.stated_frac)};
+          mix(a.stated_frac, b.stated_frac),
+          mix(a.film_factor, b.film_factor)};
 }
 
 AirFlow raised_flow(const AirFlow& flow, double up_m) noexcept {
@@ -135,8 +137,8 @@ double felt_air_k(const AirFlow& flow) noexcept {
 AirFilm air_film(const AirFlow& flow, const AirFilmBody& body) noexcept {
   EMIT_DCHECK(body.length_m > 0.0);
   AirFilm film;
-  film.stated_w_m2_k = flow.stated_w_m2_k;
-  film.model_frac = 1.0 - flow.stated_frac;
+  film.stated_w_m2_k = flow.film_factor * flow.stated_w_m2_k;
+  film.model_frac = flow.film_factor * (1.0 - flow.stated_frac);
   if (!(film.model_frac > 0.0) || !(flow.air_k > 0.0)) return film;
   // Set the direction of the flow.
   const double directed_m2_s2 = glm::dot(flow.flow_m_s, flow.flow_m_s);

@@ -155,6 +155,7 @@ SolveFingerprint fingerprint(const scene::ScenarioDesc& scenario,
                       .add(scenario.thermal.history_start_ns)
                       .add(scenario.thermal.spin_up_ns)
                       .add(scenario.thermal.exchange)
+                      .add(scenario.thermal.film_factor)
                       .value();
   print.options =
       Hash().add(options.rays).add(options.refine).add(options.tolerance_k).add(end_ns).value();
@@ -222,7 +223,7 @@ Result<std::optional<Checkpoint>> load_checkpoint(const std::filesystem::path& f
       {header.print.materials == print.materials, "materials"},
       {header.print.geometry == print.geometry, "geometry"},
       {header.print.contacts == print.contacts, "contacts"},
-      {header.print.thermal == print.thermal, "start of the history, spin-up or thermal.exchange"},
+      {header.print.thermal == print.thermal, "start of the history, spin-up, thermal.exchange or thermal.film_factor"},
       {header.print.options == print.options, "rays, refinement, tolerance or the last instant"},
   }};
   std::string differs;

@@ -29,6 +29,7 @@ struct Weather {
   physics::ClearSky clear_sky;
   std::vector<physics::WeatherSample> rows;
   double usual_dew_point_k = 0.0;
+  double film_factor = 1.0;
 
   explicit Weather(const scene::ScenarioDesc& scenario)
       : place{physics::Radians(scenario.place.lat_rad), physics::Radians(scenario.place.lon_rad),
@@ -36,18 +37,20 @@ struct Weather {
         epoch_utc_ns(scenario.epoch_utc_ns),
         clear_sky(scenario.clear_sky),
         rows(scenario.weather),
-        usual_dew_point_k(scene::usual_dew_point_k(scenario)) {}
+        usual_dew_point_k(scene::usual_dew_point_k(scenario)),
+        film_factor(scenario.thermal.film_factor) {}
 
   /// Returns the climate at a time. `before` gives the limit from earlier times at a jump of the
   /// table. `stated` returns whether the weather gives the temperature of the surroundings.
   [[nodiscard]] ClimateNode at(std::int64_t time_ns, bool before, bool& stated) const {
     // Evaluate the input models.
     const physics::SunPosition sun = physics::sun_position(epoch_utc_ns + time_ns, place);
-    const physics::Forcing forcing =
+    physics::Forcing forcing =
         rows.empty()
             ? physics::forcing_from_clear_sky(clear_sky, place, sun, epoch_utc_ns + time_ns)
             : physics::at_place(physics::forcing_from_rows(rows, before ? time_ns - 1 : time_ns),
                                 place, sun);
+    forcing.film_factor = film_factor;
     ClimateNode node;
     node.time_ns = time_ns;
     node.to_sun = sun.direction_enu;

@@ -10,5 +10,6 @@ void add_bench_convergence(CommandLine& bench);
 void add_bench_error(CommandLine& bench);
 void add_bench_subpixel(CommandLine& bench);
 void add_bench_thermal_truth(CommandLine& bench);
+void add_bench_uncertainty(CommandLine& bench);
 
 }  // namespace emit::tool

@@ -107,6 +107,26 @@ TEST(CliBench, GasIsMeasuredBesideTheSceneWithoutIt) {
   for (const double ms : numbers_of(json, "frame_ms_median")) EXPECT_GT(ms, 0.0);
 }
 
+TEST(CliBench, UncertaintyMovesEveryInputBothWays) {
+  const TemporaryFolder folder;
+  const ProcessResult run = run_emit(
+      {"bench", "uncertainty", "box", "--set", "thermal.tolerance_k=20", "--set", "thermal.steps=6",
+       "--set", "sensor.width_px=48", "--set", "sensor.height_px=36", "--json",
+       folder.file("u.json"), "--plot", folder.file("u.svg")});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const std::string json = read_text(folder.file("u.json"));
+  EXPECT_EQ(json_value(json, "suite"), "\"uncertainty\"");
+  const std::vector<double> all_k = numbers_of(json, "all_rms_k");
+  ASSERT_FALSE(all_k.empty());
+  for (const double k : all_k) {
+    EXPECT_GT(k, 1.0);
+    EXPECT_LT(k, 20.0);
+  }
+  // Every input has a mean shift at either end, in every band.
+  EXPECT_EQ(numbers_of(json, "mean_k").size(), 24 * all_k.size());
+  EXPECT_NE(read_text(folder.file("u.svg")).find("film of the air"), std::string::npos);
+}
+
 TEST(CliBench, LossyStreamsSayWhatCameAndNothingOfItIsWrong) {
   const TemporaryFolder folder;
   const ProcessResult run =

@@ -93,6 +93,7 @@ struct AirFlow {
   double undirected_m_s = 0;  ///< speed whose direction is not known; adds in squares
   double stated_w_m2_k = 0.0;
   double stated_frac = 0.0;  ///< 0..1
+  double film_factor = 1.0;  ///< multiplies the film, > 0
 };
 /// Returns the flow past a body at rest.
 [[nodiscard]] AirFlow air_flow(const Forcing& weather) noexcept;

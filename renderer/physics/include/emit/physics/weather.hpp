@@ -61,6 +61,7 @@ struct Forcing {
   /// Gusts that convection adds in squares to the wind (gusts.hpp).
   double gust_m_s = 0.0;
   double height_m = 0.0;  ///< of the place
+  double film_factor = 1.0;  ///< multiplies the film of every face
   double cloud_frac = 0.0;
   /// Vapour pressure that the weather states, multiplied by its share, and that share: between a
   /// row that states the humidity and one that does not, the share goes from 1 to 0.
