@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "emit/physics/climate.hpp"
+#include "emit/physics/climate/climate.hpp"
 #include "emit/physics/constants.hpp"
 #include "emit/scene/base.hpp"
 #include "overrides.hpp"

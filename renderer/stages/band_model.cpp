@@ -8,7 +8,7 @@
 
 #include "emit/physics/band_radiance_lut.hpp"
 #include "emit/physics/clear_sky.hpp"
-#include "emit/physics/climate.hpp"
+#include "emit/physics/climate/climate.hpp"
 #include "emit/physics/sky_state.hpp"
 #include "emit/scene/base.hpp"
 

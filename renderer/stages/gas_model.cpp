@@ -12,7 +12,7 @@
 
 #include "emit/physics/air_film.hpp"
 #include "emit/physics/check.hpp"
-#include "emit/physics/gas_puff.hpp"
+#include "emit/physics/gas/puff.hpp"
 #include "passes/gas_pass.hpp"
 
 namespace emit::renderer {
@@ -72,7 +72,7 @@ class LineOpacity {
   [[nodiscard]] double widened_depth(double depth, double narrow_frac) const noexcept {
     if (!(depth > 0.0)) return 0.0;
     const double place = (std::log(depth) - kFirstLog) / kLogStep;
-    // Where gas is thin, opacity is depth.
+    // Thin gas is as opaque as it is deep.
     if (place <= 0.0) return depth * narrow_frac;
     const auto low = std::min(static_cast<std::size_t>(place), kNodes - 2);
     const double frac = place - static_cast<double>(low);
@@ -404,7 +404,7 @@ void GasModel::add_smoke(const Source<scene::SmokeDesc>& smoke, const View& view
   const physics::AirFlow wind = physics::air_flow(forcing_);
   const double wind_m_s = std::hypot(glm::length(wind.flow_m_s), wind.undirected_m_s);
   const glm::dvec3 drift_m_s = wind.flow_m_s + glm::dvec3(0.0, 0.0, desc.rise_m_s);
-  // What was given off at an age lies where the source was then, carried on by the wind.
+  // Smoke of an age lies where the source was then, carried on by the wind.
   const double oldest_s = static_cast<double>(view.sim_time_ns - desc.start_ns) * 1e-9;
   const double youngest_s = desc.stop_ns < view.sim_time_ns
                                 ? static_cast<double>(view.sim_time_ns - desc.stop_ns) * 1e-9

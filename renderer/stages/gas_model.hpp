@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "emit/physics/air_view.hpp"
-#include "emit/physics/gas_spectrum.hpp"
-#include "emit/physics/jet.hpp"
+#include "emit/physics/gas/spectrum.hpp"
+#include "emit/physics/gas/jet.hpp"
 #include "emit/renderer/renderer.hpp"
 #include "emit/scene/scene_desc.hpp"
 #include "shared/frame_params.glsl.h"

@@ -51,16 +51,39 @@ void add_colors(std::string& text, image::ColorMap map) {
   text += '"';
 }
 
+/// Name and unit of what the pixels of a channel hold, for the page.
+struct QuantityText {
+  std::string_view name;
+  std::string_view unit;
+};
+QuantityText quantity_text(protocol::PixelQuantity quantity) noexcept {
+  switch (quantity) {
+    case protocol::PixelQuantity::radiance_w_m2_sr:
+      return {"radiance", "W m\u207b\u00b2 sr\u207b\u00b9"};
+    case protocol::PixelQuantity::temperature_k:
+      return {"apparent temperature", "K"};
+    case protocol::PixelQuantity::drive:
+      return {"drive", "drive"};
+    case protocol::PixelQuantity::counts:
+      return {"counts", "counts"};
+    case protocol::PixelQuantity::photon_radiance:
+      return {"photon radiance", "s\u207b\u00b9 m\u207b\u00b2 sr\u207b\u00b9"};
+  }
+  return {"values", ""};
+}
+
 void add_channel(std::string& text, const Channel& channel) {
+  const QuantityText quantity = quantity_text(channel.quantity);
   const bool radiance = has_radiance(channel);
   fmt::format_to(
       Out(text),
       R"({{"index":{},"name":{},"kind":"{}","sensor":{},"band":{},"lo_um":{},"hi_um":{},)"
-      R"("width_px":{},"height_px":{},"every_nth":{},"radiance":{},"temperature":{}}})",
+      R"("width_px":{},"height_px":{},"every_nth":{},"radiance":{},"temperature":{},)"
+      R"("quantity":"{}","unit":"{}"}})",
       channel.index, json_string(channel.name), to_string(channel.kind),
       json_string(channel.sensor), json_string(channel.band), channel.band_lo_um,
       channel.band_hi_um, channel.width_px, channel.height_px, channel.every_nth, radiance,
-      radiance && physics::validate(band_of(channel)).has_value());
+      radiance && physics::validate(band_of(channel)).has_value(), quantity.name, quantity.unit);
 }
 
 double us_between(std::int64_t from_ns, std::int64_t to_ns) noexcept {

@@ -7,7 +7,7 @@
 #include "emit/physics/air_film.hpp"
 #include "emit/physics/check.hpp"
 #include "emit/physics/evaporation.hpp"
-#include "emit/physics/gusts.hpp"
+#include "emit/physics/climate/gusts.hpp"
 
 namespace emit::physics {
 namespace {

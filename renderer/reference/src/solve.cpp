@@ -13,7 +13,7 @@
 #include <numeric>
 #include <optional>
 
-#include "emit/physics/climate.hpp"
+#include "emit/physics/climate/climate.hpp"
 #include "emit/physics/weather.hpp"
 #include "emit/reference/surface_forcing.hpp"
 #include "emit/reference/visibility.hpp"

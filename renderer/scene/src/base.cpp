@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "emit/physics/climate.hpp"
+#include "emit/physics/climate/climate.hpp"
 
 namespace emit::scene {
 namespace {

@@ -2,7 +2,7 @@
 #ifndef EMIT_LIB_GAS_PUFF
 #define EMIT_LIB_GAS_PUFF
 
-// Column of a Gaussian puff of gas along a line of sight (physics.md eq. 54). Twin of physics/gas_puff.hpp.
+// Column of a Gaussian puff of gas along a line of sight (physics.md eq. 54). Twin of physics/gas/puff.hpp.
 
 // Error function by formula 7.1.26 of Abramowitz and Stegun, within 1.5e-7.
 float gas_erf(float x) {

@@ -191,7 +191,7 @@ class Console {
 
   private get unit(): string {
     const channel = this.facts?.channels[this.channel];
-    if (channel !== undefined && !channel.radiance) return "drive";
+    if (channel !== undefined && !channel.radiance) return channel.unit;
     return this.showsKelvins ? "K" : "W m\u207b\u00b2 sr\u207b\u00b9";
   }
 
@@ -223,7 +223,9 @@ class Console {
 
   private quantityChanged(): void {
     this.probes.convertAll(this.convert);
-    element("quantity").textContent = this.showsKelvins ? "temperature" : "radiance";
+    element("quantity").textContent = this.showsKelvins
+      ? "temperature"
+      : (this.facts?.channels[this.channel]?.quantity ?? "radiance");
     (element("quantity") as HTMLButtonElement).disabled = this.table === undefined;
     this.findLimits();
     this.redraw();
@@ -343,8 +345,7 @@ class Console {
       const radiance = this.image.value(this.cursor);
       const table = this.table;
       const parts = [`x ${this.cursor.x}  y ${this.cursor.y}`];
-      if (this.facts?.channels[this.channel].radiance === false) parts.push(`${radiance.toPrecision(6)} drive`);
-      else parts.push(`${radiance.toPrecision(6)} W m\u207b\u00b2 sr\u207b\u00b9`);
+      parts.push(`${radiance.toPrecision(6)} ${this.facts?.channels[this.channel].unit ?? ""}`);
       if (table !== undefined) parts.push(`${table.kelvin(radiance).toFixed(2)} K`);
       box.textContent = parts.join("    ");
     }

@@ -76,7 +76,7 @@ export class Panels {
         `${channel.width_px}\u00d7${channel.height_px}`,
         channel.lo_um > 0 ? `${channel.lo_um}\u2013${channel.hi_um} \u00b5m` : "",
         channel.every_nth === 1 ? "every frame" : `every ${channel.every_nth}th`,
-        channel.radiance ? "radiance" : "drive",
+        channel.quantity,
       ]),
     );
     element("axes-panel").hidden = !hello.motion;

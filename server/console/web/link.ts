@@ -13,6 +13,8 @@ export interface Channel {
   height_px: number;
   every_nth: number;
   radiance: boolean;
+  quantity: string; // what the pixels hold
+  unit: string;
   temperature: boolean;
 }
 

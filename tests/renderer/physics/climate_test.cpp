@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "emit/physics/climate.hpp"
+#include "emit/physics/climate/climate.hpp"
 
 #include <gtest/gtest.h>
 

@@ -294,8 +294,8 @@ TEST(Evaporation, ExtremeStepsStayBetweenTheColdestAndTheDryBalance) {
     foster_advance(e.x, e.begin, e.end, ladder, e.surface, 0.01);
     const double k = kReferenceK + foster_offset_k(e.x, e.surface);
     ASSERT_TRUE(std::isfinite(k)) << i;
-    // Without evaporation the balance of the surface alone is the warmest that can come; with all
-    // of the water it is the coldest.
+    // The balance of the dry surface alone is the warmest that can come, and that with all of the
+    // water is the coldest.
     const auto balance_k = [&](const FosterDrive<double>& drive) {
       double low = 100.0;
       double high = 500.0;

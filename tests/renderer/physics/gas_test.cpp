@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "emit/physics/constants.hpp"
-#include "emit/physics/gas_puff.hpp"
-#include "emit/physics/gas_spectrum.hpp"
-#include "emit/physics/jet.hpp"
+#include "emit/physics/gas/puff.hpp"
+#include "emit/physics/gas/spectrum.hpp"
+#include "emit/physics/gas/jet.hpp"
 
 /// Spectra of hot gas, jets and puffs against published correlations and quadrature.
 namespace emit::physics {

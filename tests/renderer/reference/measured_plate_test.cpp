@@ -12,7 +12,7 @@
 
 #include "emit/physics/air_film.hpp"
 #include "emit/physics/constants.hpp"
-#include "emit/physics/gusts.hpp"
+#include "emit/physics/climate/gusts.hpp"
 
 namespace emit::reference {
 namespace {

@@ -10,7 +10,7 @@
 #include "emit/physics/apparent_temperature.hpp"
 #include "emit/physics/atmosphere_table.hpp"
 #include "emit/physics/clear_sky.hpp"
-#include "emit/physics/climate.hpp"
+#include "emit/physics/climate/climate.hpp"
 #include "emit/physics/constants.hpp"
 #include "emit/physics/planck.hpp"
 #include "support/renderer_scene.hpp"

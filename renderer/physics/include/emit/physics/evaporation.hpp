@@ -25,7 +25,7 @@ struct MoistAir {
 /// Returns the moist air between `a` (f = 0) and `b` (f = 1), linear in f.
 [[nodiscard]] MoistAir between_airs(const MoistAir& a, const MoistAir& b, double f) noexcept;
 
-/// How a surface gives water to the air. A wetness of 0 is a dry surface.
+/// Water that a surface gives to the air. A wetness of 0 is a dry surface.
 struct MoistSurface {
   double wetness_frac = 0.0;    ///< share of the rate of a surface that is moist all over, 0..1
   double resistance_s_m = 0.0;  ///< between the water and the air at the surface, in sunlight

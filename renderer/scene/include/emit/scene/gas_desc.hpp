@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "emit/physics/gas_spectrum.hpp"
+#include "emit/physics/gas/spectrum.hpp"
 
 /// Hot gas, flares and smoke of a scenario (physics.md section 13). They are part of the picture
 /// and take no part in the heat of surfaces. All values SI.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "emit/physics/gas_spectrum.hpp"
+#include "emit/physics/gas/spectrum.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "emit/physics/jet.hpp"
+#include "emit/physics/gas/jet.hpp"
 
 #include <algorithm>
 #include <cmath>
