@@ -211,7 +211,7 @@ def uncertainty_tables(rows):
     for row in rows:
         flat = [{"band": row["band"], **{k: i[k] for k in ("input", "range", "source")},
                  "low": i["low"]["mean_k"], "high": i["high"]["mean_k"],
-                 "rms": max(i["low"]["rms_k"], i["high"]["rms_k"])} for i in row["inputs"]]
+                 "rms": max(i["low"]["rms_k"], i["high"]["rms_k"])} for i in row["inputs"] if i["low"]]
         yield table([("band", field("band")), ("input", field("input")), ("range", field("range")),
                      ("low end, mean K", field("low")), ("high end, mean K", field("high")), ("RMS, K", field("rms")),
                      ("source of the range", field("source"))], flat)

@@ -86,12 +86,10 @@ physics::Forcing Environment::forcing_at(std::int64_t sim_time_ns,
       [](std::int64_t t, const physics::WeatherSample& row) { return t < row.sim_time_ns; });
   physics::Forcing forcing;
   if (after == live_.begin() && table_.empty()) {
-    forcing =
-        physics::forcing_from_clear_sky(clear_sky_, place_, sun, epoch_utc_ns_ + sim_time_ns);
+    forcing = physics::forcing_from_clear_sky(clear_sky_, place_, sun, epoch_utc_ns_ + sim_time_ns);
   } else {
-    forcing = after != live_.begin()
-                  ? physics::forcing_from_rows({&*(after - 1), 1}, sim_time_ns)
-                  : physics::forcing_from_rows(table_, sim_time_ns);
+    forcing = after != live_.begin() ? physics::forcing_from_rows({&*(after - 1), 1}, sim_time_ns)
+                                     : physics::forcing_from_rows(table_, sim_time_ns);
     forcing = physics::with_vapour(physics::at_place(forcing, place_, sun), usual_dew_point_k_);
   }
   forcing.film_factor = film_factor_;

@@ -109,6 +109,26 @@ void PoseHistory::note_motion(const scene::Keyframe& last, const scene::Keyframe
   }
 }
 
+void PoseHistory::note_appearance(std::int64_t sim_time_ns) noexcept {
+  appearances_ns_[appearance_count_++ % kMaxAppearances] = sim_time_ns;
+}
+
+std::optional<std::int64_t> PoseHistory::on_since_ns(std::int64_t sim_time_ns) const noexcept {
+  // Take the latest appearance that the host caused, then that of the script before the host came.
+  const std::size_t kept = std::min(appearance_count_, kMaxAppearances);
+  for (std::size_t i = 1; i <= kept; ++i) {
+    const std::int64_t at_ns = appearances_ns_[(appearance_count_ - i) % kMaxAppearances];
+    if (at_ns <= sim_time_ns) return at_ns;
+  }
+  std::int64_t scripted_ns = sim_time_ns;
+  if (!live_.empty()) scripted_ns = std::min(scripted_ns, live_.front().sim_time_ns);
+  for (std::size_t i = scripted_.size(); i-- > 1;) {
+    if (scripted_[i].sim_time_ns > scripted_ns) continue;
+    if (scripted_[i].on && !scripted_[i - 1].on) return scripted_[i].sim_time_ns;
+  }
+  return std::nullopt;
+}
+
 bool PoseHistory::append(std::int64_t sim_time_ns, const physics::Pose& pose, bool on,
                          bool teleport) noexcept {
   if (!live_.empty() && sim_time_ns < live_.back().sim_time_ns) return false;
@@ -121,12 +141,14 @@ bool PoseHistory::append(std::int64_t sim_time_ns, const physics::Pose& pose, bo
       events_ns_.pop_back();
     }
     if (planned.on != on || !close(planned.pose, pose)) note_event(sim_time_ns);
+    if (on && !planned.on) note_appearance(sim_time_ns);
     live_.push_back(next);
     moving_ = false;
     spot_ = next;
     return true;
   }
   const scene::Keyframe& last = live_.back();
+  if (on && !last.on) note_appearance(sim_time_ns);
   if (sim_time_ns == last.sim_time_ns) {
     live_.back() = next;
     return true;
@@ -188,6 +210,7 @@ void PoseHistory::make_room() noexcept {
 
 void PoseHistory::reset() noexcept {
   live_.clear();
+  appearance_count_ = 0;
   dropped_ = 0;
   skipped_count_ = 0;
   skipped_stride_ = 1;

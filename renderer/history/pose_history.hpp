@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -85,6 +86,12 @@ class PoseHistory {
   /// latest kMaxEvents.
   [[nodiscard]] std::span<const std::int64_t> events_ns() const noexcept { return events_ns_; }
 
+  /// Returns the instant since which the entity has been on at `sim_time_ns`: the latest at which
+  /// it appeared. Empty if it was never off before. The latest kMaxAppearances are known.
+  /// @pre at(sim_time_ns).on
+  [[nodiscard]] std::optional<std::int64_t> on_since_ns(std::int64_t sim_time_ns) const noexcept;
+  static constexpr std::size_t kMaxAppearances = 16;
+
   /// Returns the live poses that are kept, ascending in time.
   [[nodiscard]] std::span<const scene::Keyframe> live() const noexcept { return live_; }
 
@@ -94,6 +101,7 @@ class PoseHistory {
 
  private:
   void note_event(std::int64_t sim_time_ns) noexcept;
+  void note_appearance(std::int64_t sim_time_ns) noexcept;
   [[nodiscard]] bool replaces_last(const scene::Keyframe& next) noexcept;
   void make_room() noexcept;
   void note_motion(const scene::Keyframe& last, const scene::Keyframe& next) noexcept;
@@ -114,6 +122,8 @@ class PoseHistory {
   std::size_t skipped_stride_ = 1;
   std::size_t skipped_phase_ = 0;
   std::uint64_t dropped_ = 0;
+  std::array<std::int64_t, kMaxAppearances> appearances_ns_{};  ///< by the host, a ring
+  std::size_t appearance_count_ = 0;
 };
 
 /// View of the entities' poses: by what is known now, by what was known earlier, or with

@@ -76,9 +76,8 @@ Extent extent_of(const gpu::GasPuff& puff, const gpu::GasImage& image,
     const glm::dvec2 reach = kReachSigmas * sigma_px / side + 1.0;
     out = {middle - reach, middle + reach};
   } else {
-    const double per_along_m2 = double{puff.per_across_m2} + puff.more_per_along_m2;
     const double radius_m =
-        kReachSigmas / std::sqrt(std::min(double{puff.per_across_m2}, per_along_m2));
+        kReachSigmas / std::sqrt(double{std::min(puff.per_across_m2, puff.per_along_axis_m2)});
     const glm::dvec3 centre_m(puff.centre_m);
     if (centre_m.z < -radius_m) return {window_first, window_first};
     glm::dvec2 low;
@@ -185,33 +184,62 @@ void GasTiles::add(const gpu::GasImage& image) noexcept {
   touched_.clear();
   const TileRange range = tiles_of(image);
   const std::uint32_t across = range.end.x - range.first.x;
-  // Note every puff in the tiles that it reaches.
+  const auto touch = [&](const glm::uvec2& place) -> gpu::GasTile& {
+    const std::uint32_t index = (place.y - range.first.y) * across + (place.x - range.first.x);
+    gpu::GasTile& tile = grid_[index];
+    if (tile.place.z == 0) {
+      touched_.push_back(index);
+      tile.place = glm::uvec4(EMIT_GAS_TILE * place, 1, 0);
+    }
+    return tile;
+  };
+  const auto set = [](gpu::GasTile& tile, std::size_t puff) {
+    tile.puffs[puff / 128][static_cast<glm::length_t>(puff / 32 % 4)] |= 1U << (puff % 32);
+  };
+  // Note every puff in the tiles that it reaches. Those that reach all, such as smoke around the
+  // sensor, are noted once.
+  gpu::GasTile all{};
+  bool everywhere = false;
   for (std::size_t p = 0; p < puffs_.size(); ++p) {
     const Extent extent = extent_of(puffs_[p], image, range);
     if (extent.first.x >= extent.end.x || extent.first.y >= extent.end.y) continue;
     const std::uint32_t samples = samples_for(puffs_[p], image);
     const glm::uvec2 first = glm::uvec2(extent.first) / EMIT_GAS_TILE;
     const glm::uvec2 last = (glm::uvec2(extent.end) - 1U) / EMIT_GAS_TILE;
+    if (samples == 1 && first == range.first && last + 1U == range.end) {
+      set(all, p);
+      everywhere = true;
+      continue;
+    }
     for (std::uint32_t row = first.y; row <= last.y; ++row) {
       for (std::uint32_t column = first.x; column <= last.x; ++column) {
-        const std::uint32_t index =
-            (row - range.first.y) * across + (column - range.first.x);
-        gpu::GasTile& tile = grid_[index];
-        if (tile.place.z == 0) {
-          touched_.push_back(index);
-          tile.place = glm::uvec4(EMIT_GAS_TILE * glm::uvec2(column, row), 1, 0);
-        }
+        gpu::GasTile& tile = touch({column, row});
         tile.place.z = std::max(tile.place.z, samples);
-        tile.puffs[p / 128][static_cast<glm::length_t>(p / 32 % 4)] |= 1U << (p % 32);
+        set(tile, p);
       }
     }
   }
+  for (std::uint32_t row = range.first.y; everywhere && row < range.end.y; ++row) {
+    for (std::uint32_t column = range.first.x; column < range.end.x; ++column) {
+      (void)touch({column, row});
+    }
+  }
+  // A first picture without gas has an empty tile, because drivers compile when something is drawn
+  // for the first time.
+  if (!drawn_ && touched_.empty() && !everywhere) {
+    touched_.push_back(0);
+    grid_[0].place = glm::uvec4(EMIT_GAS_TILE * range.first, 1, 0);
+  }
+  drawn_ = true;
   // List the tiles and clear the grid for the next image.
   for (const std::uint32_t index : touched_) {
-    tiles_.push_back(grid_[index]);
-    grid_[index] = gpu::GasTile{};
+    gpu::GasTile& tile = grid_[index];
+    for (std::size_t i = 0; i < EMIT_GAS_PUFF_BITS; ++i) tile.puffs[i] |= all.puffs[i];
+    tiles_.push_back(tile);
+    tile = gpu::GasTile{};
   }
   out.tiles = static_cast<std::uint32_t>(touched_.size());
+  out.params.tiles = out.tiles;
 }
 
 GasPass::GasPass(const Setup& setup)
@@ -249,7 +277,9 @@ void GasPass::draw(std::size_t image) const noexcept {
   program_.use();
   // The pixels that the passes before wrote are read here.
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
-  glDispatchCompute(images[image].tiles, 1, 1);
+  const std::uint32_t tiles = images[image].tiles;
+  constexpr std::uint32_t kColumns = EMIT_GAS_DISPATCH_COLUMNS;
+  glDispatchCompute(std::min(tiles, kColumns), (tiles + kColumns - 1) / kColumns, 1);
 }
 
 }  // namespace emit::renderer

@@ -58,7 +58,8 @@ class GasTiles {
   std::array<Image, EMIT_MAX_TARGETS + 1> images_{};
   std::size_t count_ = 0;
   std::vector<gpu::GasTile> tiles_;
-  std::vector<gpu::GasTile> grid_;  ///< of one image, row by row
+  std::vector<gpu::GasTile> grid_;      ///< of one image, row by row
+  bool drawn_ = false;                  ///< some image has had tiles
   std::vector<std::uint32_t> touched_;  ///< of the grid, in the order of the first puff
 };
 

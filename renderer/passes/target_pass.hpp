@@ -46,8 +46,9 @@ class TargetPass {
   }
   [[nodiscard]] std::size_t windows() const noexcept { return params_.count; }
   /// Adds the targets to the planes of `output`, which starts with them; counters of flagged pixels
-  /// lie from `stats_offset` on. `gas`, if there is any, is drawn over the samples. `frame_buffer` holds the parameters of the frame. Afterwards
-  /// frame, output and geometry are bound as the radiance pass of the windows needs them.
+  /// lie from `stats_offset` on. `gas`, if there is any, is drawn over the samples. `frame_buffer`
+  /// holds the parameters of the frame. Afterwards frame, output and geometry are bound as the
+  /// radiance pass of the windows needs them.
   void resolve(const RadiancePass& radiance, const GasPass* gas, const gl::Buffer& frame_buffer,
                const gl::Buffer& output, std::size_t stats_offset) const noexcept;
 

@@ -524,8 +524,7 @@ std::vector<RadianceTerms> GlRenderer::radiance_terms(const FrameView& view, con
   // See the surface through the gas in front of it.
   const float boresight_m = seen.surface ? view.depth_m[i] : EMIT_SKY_DEPTH_M;
   const GasTiles& tiles = passes_.gas->tiles();
-  const GasModel::Seen gas =
-      gas_->seen(tiles.output(), px, boresight_m, tiles.output_samples(px));
+  const GasModel::Seen gas = gas_->seen(tiles.output(), px, boresight_m, tiles.output_samples(px));
   for (std::size_t b = 0; b < out.size(); ++b) {
     RadianceTerms& terms = out[b];
     terms.gas_frac = gas.through_frac[b];
@@ -795,9 +794,9 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
   }
 
   // Create the renderer, then the thermal method, which reads its history.
-  auto renderer = std::make_unique<GlRenderer>(scenario, std::move(*context), *geometry, output,
-                                               std::move(*bands), std::move(gas),
-                                               std::move(passes));
+  auto renderer =
+      std::make_unique<GlRenderer>(scenario, std::move(*context), *geometry, output,
+                                   std::move(*bands), std::move(gas), std::move(passes));
   auto stage =
       cached ? CachedStage::create(scenario, std::move(*geometry), std::move(*foster),
                                    renderer->history(), renderer->bands(), renderer->software())

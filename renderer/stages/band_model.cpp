@@ -315,8 +315,8 @@ std::span<const physics::AirView::Node> BandModel::air_nodes_of(std::size_t band
       .subspan(params_[band].air_view_first, entries_[band].view ? physics::AirView::kNodes : 0);
 }
 
-double air_transmittance(std::span<const physics::AirView::Node> nodes, const BandModel::Sight& sight,
-                         float temperature_k) noexcept {
+double air_transmittance(std::span<const physics::AirView::Node> nodes,
+                         const BandModel::Sight& sight, float temperature_k) noexcept {
   const float target_m = sight.sensor_height_m + sight.range_m * sight.sin_elevation;
   const auto node = physics::air_sight_node(nodes, target_m, sight.range_m);
   // Between 300 K, 800 K and the sun the extinction goes linearly in 1 / T.
@@ -379,8 +379,8 @@ RadianceTerms BandModel::terms(std::size_t band, const Seen& seen,
     return out;
   }
   // Find what the air lets through and what it adds.
-  const AirWay way = air_way(
-      band, {seen.range_m, seen.sin_elevation, seen.sensor_height_m}, seen.temperature_k);
+  const AirWay way =
+      air_way(band, {seen.range_m, seen.sin_elevation, seen.sensor_height_m}, seen.temperature_k);
   out.air_frac = way.air_frac;
   out.air_sun_frac = way.air_sun_frac;
   out.path_w_m2_sr = way.path_w_m2_sr;

@@ -36,21 +36,25 @@ constexpr double kLastExhaust = 0.04;
 /// differ from the value in the middle, and the angle above which the image is no plain Gaussian.
 constexpr double kSmallSigmaPx = 4.0;
 constexpr double kSmallSigmaRad = 0.1;
+/// Least width of the image of a puff by its length.
+constexpr double kNarrowest = 1.0 / 200.0;
 /// Growth of smoke by its way through the air, for neutral air over open land (Briggs 1973, class
 /// D): the mean of 0.08 across and 0.06 upwards.
 constexpr double kSmokeSpread = 0.07;
 constexpr double kCalmM_s = 0.5;
 /// Ages of smoke puffs: the youngest are the closest together.
-constexpr double kAgePower = 1.6;
+constexpr double kAgePower = 2.5;
 
 /// Nodes and weights of Gauss and Legendre on 0..1.
-constexpr std::array<std::pair<double, double>, 5> kGauss{{{0.04691007703066802, 0.11846344252809454},
-                                                           {0.23076534494715845, 0.23931433524968324},
-                                                           {0.5, 0.28444444444444444},
-                                                           {0.76923465505284155, 0.23931433524968324},
-                                                           {0.95308992296933198, 0.11846344252809454}}};
+constexpr std::array<std::pair<double, double>, 5> kGauss{
+    {{0.04691007703066802, 0.11846344252809454},
+     {0.23076534494715845, 0.23931433524968324},
+     {0.5, 0.28444444444444444},
+     {0.76923465505284155, 0.23931433524968324},
+     {0.95308992296933198, 0.11846344252809454}}};
 
-/// Opacity of a line of gas whose optical depth falls off as a Gaussian across it: the integral of 1
+/// Opacity of a line of gas whose optical depth falls off as a Gaussian across it: the integral of
+/// 1
 /// - exp(-depth exp(-x^2 / 2)) over x, by that of the Gaussian. A line too narrow for the image is
 /// drawn wider, with the depth that leaves width times opacity the same.
 class LineOpacity {
@@ -92,6 +96,12 @@ class LineOpacity {
   static constexpr double kLogStep = 0.125;
   std::array<double, kNodes> log_opacity_{};
 };
+
+/// Table of every model. It is made when the first model is built.
+const LineOpacity& line_opacity() {
+  static const LineOpacity opacity;
+  return opacity;
+}
 
 /// Image of a puff as its two axes: variances and the direction of the first.
 struct ImageAxes {
@@ -149,6 +159,7 @@ Result<GasModel> GasModel::build(const scene::ScenarioDesc& scenario) {
                     scene::FlareDesc::kPuffs, scene::SmokeDesc::kPuffs, scene::FireDesc::kPuffs));
   }
   GasModel model;
+  (void)line_opacity();
   const std::vector<std::int32_t> histories = histories_of_objects(scenario);
   const auto source_of = [&](const auto& desc) {
     Source<std::decay_t<decltype(desc)>> source{desc, std::nullopt, {}};
@@ -230,13 +241,19 @@ Result<void> GasModel::build_air(const scene::ScenarioDesc& scenario) {
       physics::Band shaped = band;
       shaped.response.clear();
       constexpr std::size_t kPoints = 400;
+      std::vector<double> wavenumbers_per_cm;
+      for (std::size_t i = 0; i < kPoints; ++i) {
+        wavenumbers_per_cm.push_back(
+            1e4 / (band.lo_um + (band.hi_um - band.lo_um) * static_cast<double>(i) /
+                                    static_cast<double>(kPoints - 1)));
+      }
+      const std::vector<double> passed =
+          physics::gas_transmittances(exit, wavenumbers_per_cm, 2.0 * desc.radius_m);
       double most = 0.0;
       for (std::size_t i = 0; i < kPoints; ++i) {
-        const double um = band.lo_um + (band.hi_um - band.lo_um) * static_cast<double>(i) /
-                                           static_cast<double>(kPoints - 1);
+        const double um = 1e4 / wavenumbers_per_cm[i];
         const double emissivity =
-            1.0 - physics::gas_transmittance(exit, 1e4 / um, 2.0 * desc.radius_m) *
-                      std::exp(-2.0 * desc.soot_per_m * desc.radius_m);
+            1.0 - passed[i] * std::exp(-2.0 * desc.soot_per_m * desc.radius_m);
         shaped.response.push_back({um, emissivity * physics::response_frac(band, um)});
         most = std::max(most, shaped.response.back().response_frac);
       }
@@ -248,9 +265,8 @@ Result<void> GasModel::build_air(const scene::ScenarioDesc& scenario) {
       }
       auto own = physics::BandAir::build(shaped);
       if (!own) {
-        return make_error(ErrorCode::config,
-                          fmt::format("plume '{}' in band '{}': {}", desc.name,
-                                      scenario.bands[b].name, own.error().text));
+        return make_error(ErrorCode::config, fmt::format("plume '{}' in band '{}': {}", desc.name,
+                                                         scenario.bands[b].name, own.error().text));
       }
       const physics::AirView::Subject subject{&*own};
       plume.air.push_back(
@@ -266,8 +282,8 @@ void GasModel::update(const View& view, const physics::Forcing& forcing,
                       const gpu::FrameParams& frame) noexcept {
   count_ = 0;
   forcing_ = forcing;
-  const glm::dvec2 tan_per_px = glm::dvec2(frame.ray_per_px) * glm::dvec2(frame.rendered_px) /
-                                glm::dvec2(frame.output_px);
+  const glm::dvec2 tan_per_px =
+      glm::dvec2(frame.ray_per_px) * glm::dvec2(frame.rendered_px) / glm::dvec2(frame.output_px);
   px_per_tan_ = 1.0 / tan_per_px;
   px_at_axis_ = -glm::dvec2(frame.ray_at_corner) / tan_per_px;
   for (Plume& plume : plumes_) add_plume(plume, view, history, bands);
@@ -322,8 +338,8 @@ void GasModel::add_plume(Plume& plume, const View& view, const SceneHistory& his
     const double half_s = 0.5 * way_m / std::max(speed_m_s, 0.1);
     age_s += half_s;
     Puff puff;
-    puff.world_m = nozzle_m + direction * 0.5 * (from.from_nozzle_m + to.from_nozzle_m) +
-                   aside_m_s * age_s;
+    puff.world_m =
+        nozzle_m + direction * 0.5 * (from.from_nozzle_m + to.from_nozzle_m) + aside_m_s * age_s;
     age_s += half_s;
     const glm::dvec3 course_m_s = direction * speed_m_s + aside_m_s;
     puff.axis = glm::normalize(course_m_s);
@@ -342,17 +358,18 @@ void GasModel::add_plume(Plume& plume, const View& view, const SceneHistory& his
         const double gas_per_m =
             weight * exhaust * atmospheres *
             (desc.exhaust.co2_frac * mean[0] + desc.exhaust.h2o_frac * mean[1]);
-        const double grey_per_m = weight * exhaust * atmospheres * desc.soot_per_m * exit.kelvin / kelvin;
+        const double grey_per_m =
+            weight * exhaust * atmospheres * desc.soot_per_m * exit.kelvin / kelvin;
         puff.gas_per_m[b] += gas_per_m;
         puff.grey_per_m[b] += grey_per_m;
-        emitted[b] += (gas_per_m + grey_per_m) *
-                      double{bands.black_w_m2_sr(b, static_cast<float>(kelvin))};
+        emitted[b] +=
+            (gas_per_m + grey_per_m) * double{bands.black_w_m2_sr(b, static_cast<float>(kelvin))};
       }
     }
     // Hot gas is thin, so that absorption reaches farther out than the share of exhaust.
     puff.across_m = sigma_m * std::sqrt(density);
-    const double at_middle = way_m * sigma_m * sigma_m /
-                             (kRootTwoPi * puff.across_m * puff.across_m * puff.along_m);
+    const double at_middle =
+        way_m * sigma_m * sigma_m / (kRootTwoPi * puff.across_m * puff.across_m * puff.along_m);
     for (std::size_t b = 0; b < spectra_.size(); ++b) {
       const double all_per_m = puff.gas_per_m[b] + puff.grey_per_m[b];
       puff.source_w_m2_sr[b] = all_per_m > 0.0 ? emitted[b] / all_per_m : 0.0;
@@ -370,11 +387,7 @@ void GasModel::add_flare(const Source<scene::FlareDesc>& flare, const View& view
   // Find when it appeared.
   std::int64_t lit_ns = start_ns_;
   if (flare.entity) {
-    const PoseHistory& entity = history.entities[*flare.entity];
-    for (const std::int64_t event_ns : entity.events_ns()) {
-      if (event_ns > view.sim_time_ns) break;
-      if (entity.at(event_ns).on && !entity.at(event_ns - 1).on) lit_ns = event_ns;
-    }
+    lit_ns = history.entities[*flare.entity].on_since_ns(view.sim_time_ns).value_or(start_ns_);
   }
   const scene::FlareDesc& desc = flare.desc;
   const double age_s = static_cast<double>(view.sim_time_ns - lit_ns) * 1e-9;
@@ -417,6 +430,7 @@ void GasModel::add_smoke(const Source<scene::SmokeDesc>& smoke, const View& view
            drift_m_s * age_s;
   };
   const double first_sigma_m = 0.5 * desc.radius_m;
+  const double puff_slack_m = desc.radius_m;  // a source that turns is nearer than its way is long
   for (std::size_t i = 0; i < scene::SmokeDesc::kPuffs; ++i) {
     const auto age_at = [&](std::size_t edge) {
       return desc.lifetime_s *
@@ -430,7 +444,16 @@ void GasModel::add_smoke(const Source<scene::SmokeDesc>& smoke, const View& view
     const glm::dvec3 young_m = place_m(from_s).value_or(*middle_m);
     const glm::dvec3 old_m = place_m(to_s).value_or(*middle_m);
     const double age_s = 0.5 * (from_s + to_s);
-    const double length_m = glm::distance(young_m, old_m);
+    // A jump of the source leaves no smoke on the way.
+    double length_m = glm::distance(young_m, old_m);
+    if (smoke.entity) {
+      const auto at_ns = [&](double age_s) {
+        return view.sim_time_ns - static_cast<std::int64_t>(age_s * 1e9);
+      };
+      const double way_m = history.entities[*smoke.entity].path_m(at_ns(to_s), at_ns(from_s)) +
+                           glm::length(drift_m_s) * (to_s - from_s);
+      if (length_m > 2.0 * way_m + puff_slack_m) length_m = 0.0;
+    }
     Puff puff;
     puff.world_m = *middle_m;
     puff.across_m = first_sigma_m + kSmokeSpread * std::max(wind_m_s, kCalmM_s) * age_s;
@@ -480,8 +503,8 @@ void GasModel::add_fire(const Source<scene::FireDesc>& fire, const View& view,
   const glm::dvec3 base_m =
       stand->pose.position_world_m + stand->pose.world_from_body * desc.position_m;
   // A weak fire is a flat one: it is no lower than a quarter of its width.
-  const double height_m = std::max(
-      physics::flame_height_m(desc.heat_release_w, desc.diameter_m), 0.25 * desc.diameter_m);
+  const double height_m = std::max(physics::flame_height_m(desc.heat_release_w, desc.diameter_m),
+                                   0.25 * desc.diameter_m);
   constexpr auto kPuffs = static_cast<double>(scene::FireDesc::kPuffs);
   const double spacing_m = height_m / kPuffs;
   for (std::size_t i = 0; i < scene::FireDesc::kPuffs; ++i) {
@@ -517,11 +540,11 @@ void GasModel::add(const Puff& puff, const View& view, const BandModel& bands,
   const double across_m2 = puff.across_m * puff.across_m;
   const double along_m2 = puff.along_m * puff.along_m;
   out.per_across_m2 = static_cast<float>(1.0 / across_m2);
-  out.more_per_along_m2 = static_cast<float>(1.0 / along_m2 - 1.0 / across_m2);
+  out.per_along_axis_m2 = static_cast<float>(1.0 / along_m2);
   const glm::dvec3 to_centre = range_m > 0.0 ? centre_m / range_m : glm::dvec3(0.0, 0.0, 1.0);
-  const double ray_axis = glm::dot(to_centre, axis);
-  const double line_m = 1.0 / std::sqrt(1.0 / across_m2 +
-                                        (1.0 / along_m2 - 1.0 / across_m2) * ray_axis * ray_axis);
+  const double cosine = glm::dot(to_centre, axis);
+  const double sine = glm::length(glm::cross(to_centre, axis));
+  const double line_m = 1.0 / std::sqrt(sine * sine / across_m2 + cosine * cosine / along_m2);
   out.per_along_m = static_cast<float>(1.0 / line_m);
   // Give a small or distant puff the Gaussian image of its density.
   std::array<double, 2> narrow_frac{1.0, 1.0};
@@ -539,13 +562,15 @@ void GasModel::add(const Puff& puff, const View& view, const BandModel& bands,
     if (std::sqrt(axes.variance_px2[1]) < kSmallSigmaPx) {
       kind |= EMIT_GAS_SMALL;
       out.centre_px = glm::vec2(tan * px_per_tan_ + px_at_axis_);
-      // Widen an image that the samples of a pixel would miss.
-      constexpr double kFinestPx = double{kGasSampleSigmas} / kMostGasSamples;
+      // Widen an image that the samples of a pixel would miss, or that is so narrow for its length
+      // that float32 could not tell it from a line.
+      const double finest_px = std::max(double{kGasSampleSigmas} / kMostGasSamples,
+                                        kNarrowest * std::sqrt(axes.variance_px2[0]));
       for (std::size_t a = 0; a < 2; ++a) {
         const double sigma_px = std::sqrt(axes.variance_px2[a]);
-        if (sigma_px >= kFinestPx) continue;
-        narrow_frac[a] = sigma_px / kFinestPx;
-        axes.variance_px2[a] = kFinestPx * kFinestPx;
+        if (sigma_px >= finest_px) continue;
+        narrow_frac[a] = sigma_px / finest_px;
+        axes.variance_px2[a] = finest_px * finest_px;
       }
       covariance = axes.covariance_px2();
       out.covariance_px2 = glm::vec3(covariance);
@@ -553,7 +578,7 @@ void GasModel::add(const Puff& puff, const View& view, const BandModel& bands,
   }
   out.kind = static_cast<float>(kind);
   // See the puff through the air, and its optical depth by spectral term.
-  static const LineOpacity opacity;
+  const LineOpacity& opacity = line_opacity();
   const BandModel::Sight sight{
       .range_m = static_cast<float>(range_m),
       .sin_elevation = static_cast<float>(range_m > 0.0 ? from_camera_m.z / range_m : 0.0),
@@ -562,16 +587,20 @@ void GasModel::add(const Puff& puff, const View& view, const BandModel& bands,
   for (std::size_t b = 0; b < band_names_.size(); ++b) {
     const auto k = static_cast<glm::length_t>(b);
     const BandModel::AirWay way = bands.air_way(b, sight, kelvin);
-    double air_frac = way.air_frac;
+    // The air leaves a smaller share of what hot gas sends than of a blackbody, because cold gas of
+    // the same kind absorbs it. It leaves as small a share of what that gas takes from behind.
+    out.air_share_frac[k] = 1.0F;
     for (const GasAir& own : air) {
-      if (own.band == b) air_frac = air_transmittance(own.nodes, sight, kelvin);
+      if (own.band != b || !(way.air_frac > 0.0)) continue;
+      out.air_share_frac[k] = static_cast<float>(
+          std::min(1.0, air_transmittance(own.nodes, sight, kelvin) / way.air_frac));
     }
     out.source_w_m2_sr[k] = static_cast<float>(
-        puff.flare ? narrow_frac[0] * narrow_frac[1] * puff.source_w_m2_sr[b] * air_frac
-                   : puff.source_w_m2_sr[b] * air_frac + way.path_w_m2_sr);
+        puff.flare ? narrow_frac[0] * narrow_frac[1] * puff.source_w_m2_sr[b] * way.air_frac
+                   : puff.source_w_m2_sr[b] * way.air_frac + way.path_w_m2_sr);
     for (std::size_t t = 0; t < physics::kGasTerms; ++t) {
-      double depth = kRootTwoPi * line_m *
-                     (puff.gas_per_m[b] * spectra_[b].depth()[t] + puff.grey_per_m[b]);
+      double depth =
+          kRootTwoPi * line_m * (puff.gas_per_m[b] * spectra_[b].depth()[t] + puff.grey_per_m[b]);
       for (const double frac : narrow_frac) {
         // The neighbours in the row lie over the puff and make its line opaque with it.
         if (frac < 1.0) {
@@ -588,8 +617,7 @@ GasModel::Seen GasModel::seen(const gpu::GasImage& image, const glm::uvec2& px, 
   Seen out;
   out.through_frac.fill(samples == 0 ? 1.0 : 0.0);
   const glm::vec2 tan = (glm::vec2(px) + 0.5F) * image.ray_per_px + image.ray_at_corner;
-  const float surface_m =
-      std::min(boresight_m, EMIT_GAS_FAR_M) * glm::length(glm::vec3(tan, 1.0F));
+  const float surface_m = std::min(boresight_m, EMIT_GAS_FAR_M) * glm::length(glm::vec3(tan, 1.0F));
   const glm::vec2 side_px = image.side_px / static_cast<float>(samples);
   const double share = 1.0 / (double{1} * samples * samples);
   for (std::uint32_t s = 0; s < samples * samples; ++s) {
@@ -599,32 +627,34 @@ GasModel::Seen GasModel::seen(const gpu::GasImage& image, const glm::uvec2& px, 
     const glm::vec2 place_px = sample_tan * image.px_per_tan + image.px_at_axis;
     const glm::vec3 ray = glm::normalize(glm::vec3(sample_tan, 1.0F));
     std::array<glm::vec4, EMIT_MAX_BANDS> through;
+    std::array<glm::vec4, EMIT_MAX_BANDS> taken{};
     std::array<glm::vec4, EMIT_MAX_BANDS> added{};
     through.fill(glm::vec4(1.0F));
     for (const gpu::GasPuff& puff : puffs()) {
       const auto kind = static_cast<unsigned>(puff.kind);
       float column = 0.0F;
       if ((kind & EMIT_GAS_SMALL) != 0) {
-        column = physics::gas_image_column(place_px - puff.centre_px, puff.covariance_px2,
-                                           side_px) *
-                 physics::gas_before(puff.range_m * puff.per_along_m,
-                                     surface_m * puff.per_along_m);
+        column =
+            physics::gas_image_column(place_px - puff.centre_px, puff.covariance_px2, side_px) *
+            physics::gas_before(puff.range_m * puff.per_along_m, surface_m * puff.per_along_m);
       } else {
-        const physics::GasLine line = physics::gas_line(
-            ray, puff.centre_m, puff.per_across_m2, puff.axis, puff.more_per_along_m2);
+        const physics::GasLine line = physics::gas_line(ray, puff.centre_m, puff.per_across_m2,
+                                                        puff.axis, puff.per_along_axis_m2);
         column = std::exp(-0.5F * line.square) * line.sigma_m * puff.per_along_m *
                  physics::gas_before(line.place_m / line.sigma_m, surface_m / line.sigma_m);
       }
       for (std::size_t b = 0; b < band_names_.size(); ++b) {
         const glm::vec4 passed = glm::exp(-column * puff.depth[b]);
-        const glm::vec4 emitted =
-            (kind & EMIT_GAS_FLARE) != 0 ? glm::vec4(column) : 1.0F - passed;
-        added[b] += through[b] * emitted * puff.source_w_m2_sr[static_cast<glm::length_t>(b)];
+        const glm::vec4 emitted = (kind & EMIT_GAS_FLARE) != 0 ? glm::vec4(column) : 1.0F - passed;
+        const auto k = static_cast<glm::length_t>(b);
+        const glm::vec4 counted = through[b] * puff.air_share_frac[k];
+        added[b] += counted * emitted * puff.source_w_m2_sr[k];
+        taken[b] += counted * (1.0F - passed);
         through[b] *= passed;
       }
     }
     for (std::size_t b = 0; b < band_names_.size(); ++b) {
-      out.through_frac[b] += share * double{glm::dot(term_frac_[b], through[b])};
+      out.through_frac[b] += share * (1.0 - double{glm::dot(term_frac_[b], taken[b])});
       out.added_w_m2_sr[b] += share * double{glm::dot(term_frac_[b], added[b])};
     }
   }

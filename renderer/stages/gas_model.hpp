@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "emit/physics/air_view.hpp"
-#include "emit/physics/gas/spectrum.hpp"
 #include "emit/physics/gas/jet.hpp"
+#include "emit/physics/gas/spectrum.hpp"
 #include "emit/renderer/renderer.hpp"
 #include "emit/scene/scene_desc.hpp"
 #include "shared/frame_params.glsl.h"
@@ -115,8 +115,8 @@ class GasModel {
                  const SceneHistory& history, const BandModel& bands) noexcept;
   void add_smoke(const Source<scene::SmokeDesc>& smoke, const View& view,
                  const SceneHistory& history, const BandModel& bands) noexcept;
-  void add_fire(const Source<scene::FireDesc>& fire, const View& view,
-                const SceneHistory& history, const BandModel& bands) noexcept;
+  void add_fire(const Source<scene::FireDesc>& fire, const View& view, const SceneHistory& history,
+                const BandModel& bands) noexcept;
   /// Places a puff in the view, unless it lies out of it.
   void add(const Puff& puff, const View& view, const BandModel& bands,
            std::span<const GasAir> air) noexcept;

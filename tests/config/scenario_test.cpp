@@ -575,7 +575,8 @@ TEST_F(ConfigTest, gas_is_read_checked_and_printed) {
   const auto loaded = scenario(
       body +
       "[[plume]]\nobject = \"jet\"\npart = \"engine\"\nnozzle_m = [-5, 0.5, -1]\nexit_k = 1600\n"
-      "[[flare]]\nobject = \"jet\"\nintensity_w_sr = { \"3-5\" = 2500.0 }\n"
+      "[[object]]\nname = \"pellet\"\nentity_id = 4\ngltf = \"a.glb\"\non = false\n"
+      "[[flare]]\nobject = \"pellet\"\nintensity_w_sr = { \"3-5\" = 2500.0 }\n"
       "[[smoke]]\nname = \"screen\"\nposition_m = [1, 2, 3]\nstart_s = -5\nstop_s = 20.5\n"
       "band_extinction_m2_g = { \"8-12\" = 0.38 }\n"
       "[[fire]]\nheat_release_w = 2e6\n");
@@ -610,6 +611,7 @@ TEST_F(ConfigTest, gas_is_read_checked_and_printed) {
       {"[[plume]]\n", "key 'object' is missing"},
       {"[[flare]]\nobject = \"jet\"\nintensity_w_sr = { \"3-6\" = 1.0 }\n",
        "'intensity_w_sr': there is no band '3-6', did you mean '3-5'?"},
+      {"[[flare]]\nobject = \"jet\"\n", "entity 'jet' is there from the beginning"},
       {"[[smoke]]\nstart_s = 5\nstop_s = 5\n", "'stop_s' must be after 'start_s'"},
       {"[[fire]]\nflame_k = 20\n", "'flame_k' is 20, must be 600 .. 2500"},
       {"[[smoke]]\n[[smoke]]\n[[smoke]]\n[[smoke]]\n[[smoke]]\n[[smoke]]\n",

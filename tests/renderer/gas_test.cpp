@@ -116,8 +116,8 @@ class Eye {
 double intensity_w_sr(const std::vector<float>& picture, double up_m) {
   double sum = 0.0;
   for (std::size_t i = 0; i < picture.size(); ++i) {
-    const glm::dvec2 tan = kPixelRad * (glm::dvec2(i % kWidth, i / kWidth) + 0.5 -
-                                        0.5 * glm::dvec2(kWidth, kHeight));
+    const glm::dvec2 tan =
+        kPixelRad * (glm::dvec2(i % kWidth, i / kWidth) + 0.5 - 0.5 * glm::dvec2(kWidth, kHeight));
     sum += (picture[i] - radiance(kGroundK)) * std::pow(1.0 + glm::dot(tan, tan), -1.5);
   }
   return sum * std::pow(kPixelRad * (kEyeUpM - up_m), 2);
@@ -159,9 +159,9 @@ TEST(Flare, BurnsFromTheInstantAtWhichItsEntityAppears) {
   s.gas.flares[0].rise_s = 1.0;
   s.gas.flares[0].burn_s = 2.0;
   s.gas.flares[0].fall_s = 2.0;
+  s.objects.back().on = false;
   Eye eye(s);
   constexpr std::int64_t kS = 1'000'000'000;
-  eye.place({}, 300.0, 1 * kS, false);
   EXPECT_NEAR(intensity_w_sr(eye.show(2 * kS), 300.0) / kIntensityW_sr, 0.0, 3e-3);
   eye.place({}, 300.0, 10 * kS, true);
   for (const auto& [after_s, share] :
@@ -169,6 +169,12 @@ TEST(Flare, BurnsFromTheInstantAtWhichItsEntityAppears) {
     const auto picture = eye.show(10 * kS + static_cast<std::int64_t>(after_s * 1e9));
     EXPECT_NEAR(intensity_w_sr(picture, 300.0) / kIntensityW_sr, share, 3e-3) << after_s;
   }
+  // It burns anew when it appears again, however many jumps its host makes.
+  eye.place({}, 300.0, 20 * kS, false);
+  eye.place({}, 300.0, 30 * kS, true);
+  for (int i = 1; i <= 300; ++i) eye.place({0.01 * i, 0.0}, 300.0, 30 * kS + i * 5'000'000);
+  const auto again = eye.show(30 * kS + 1'500'000'000);
+  EXPECT_NEAR(intensity_w_sr(again, 300.0) / kIntensityW_sr, 1.0, 3e-3);
 }
 
 TEST(Flare, BehindABodyIsHiddenAndInFrontOfItIsNot) {
@@ -222,6 +228,41 @@ TEST(Gas, AsWarmAsWhatLiesBehindItIsNotSeen) {
       ASSERT_NEAR(pixel / radiance(kGroundK), 1.0, 1e-4) << depth;
     }
   }
+}
+
+TEST(Gas, AsWarmAsAllAroundItIsNotSeenThroughAirThatAbsorbsItsLight) {
+  // Air, ground and exhaust of one temperature: the air takes more of the exhaust's spectrum than
+  // of the ground's, and neither is seen.
+  scene::ScenarioDesc s = over_ground();
+  s.bands = {{"3-5", 3.0, 5.0, {}}};
+  s.place.height_m = 0.0;
+  s.atmosphere.enabled = true;
+  s.atmosphere.bands = {{.band = "3-5", .model = physics::AirSpec{}}};
+  scene::PlumeDesc plume;
+  plume.object = "plate";
+  plume.radius_m = 1.0;
+  plume.full = plume.idle = {.exit_k = 1200.0, .exit_m_s = 400.0};
+  plume.exhaust = {0.12, 0.12};
+  Eye clear(s);
+  clear.place({2.0, 1.0}, 0.01, 1'000'000);
+  const auto without = clear.show(1'000'000);
+  s.gas.plumes = {plume};
+  float hottest = 0.0F;
+  for (const double exit_k : {kGroundK, 1200.0}) {
+    s.gas.plumes[0].full.exit_k = s.gas.plumes[0].idle.exit_k = exit_k;
+    Eye eye(s);
+    eye.place({2.0, 1.0}, 0.01, 1'000'000);
+    const auto with = eye.show(1'000'000);
+    for (std::size_t i = 0; i < with.size(); ++i) {
+      const float ratio = with[i] / without[i];
+      hottest = std::max(hottest, ratio);
+      // Air higher up is up to some kelvins colder than the exhaust: a thousandth of the contrast.
+      if (exit_k == kGroundK) {
+        ASSERT_NEAR(ratio, 1.0F, 2e-3F) << i % kWidth << "," << i / kWidth;
+      }
+    }
+  }
+  EXPECT_GT(hottest, 1.5F);
 }
 
 TEST(Gas, OpaqueShowsItsOwnTemperature) {

@@ -197,8 +197,8 @@ std::optional<std::string> write_array(const std::vector<T>& elements, const Key
 /// Numbers as a TOML array.
 [[nodiscard]] std::string toml_vector(const double* values, std::size_t count);
 
-/// A table with one number by name of a band. `List` is a vector of structs with a member `band` and
-/// the number.
+/// A table with one number by name of a band. `List` is a vector of structs with a member `band`
+/// and the number.
 template <class T, class Field, class Value>
 Key<T> band_numbers(std::string name, std::string unit, Range range, Field field, Value value,
                     std::string meaning) {

@@ -14,7 +14,8 @@ const Range kTimes = between(-1e9, 1e9);
 
 template <class T>
 Key<T> name_key() {
-  return text<T>("name", EMIT_FIELD(name), "Name for messages; absent: kind and place in the list.");
+  return text<T>("name", EMIT_FIELD(name),
+                 "Name for messages; absent: kind and place in the list.");
 }
 
 template <class T>

@@ -266,9 +266,10 @@ const KeyTable<Material>& material_keys() {
       relaxation_modes_key(),
       foster_modes_key(),
       foster_fit_key(),
-      number<Material>("wetness_frac", "", between(0, 1), EMIT_FIELD(wetness_frac),
-                       "foster: share of the evaporation of a surface that is moist all over: 1 open "
-                       "water, 0 dry. A material with this key or the next evaporates."),
+      number<Material>(
+          "wetness_frac", "", between(0, 1), EMIT_FIELD(wetness_frac),
+          "foster: share of the evaporation of a surface that is moist all over: 1 open "
+          "water, 0 dry. A material with this key or the next evaporates."),
       number<Material>("surface_resistance_s_m", "s m-1", between(0, 1e4),
                        EMIT_FIELD(surface_resistance_s_m),
                        "foster: resistance between the water and the air at the surface, in "

@@ -440,10 +440,10 @@ const KeyTable<ThermalOptions>& thermal_keys() {
           "max_samples", "", 1000, 100000000, EMIT_FIELD(max_samples),
           "cached: largest number of thermal samples, about 1.5 kB each. Meshes that need more "
           "than half of them lose detail, and frames are flagged degraded."),
-      number<ThermalOptions>(
-          "film_factor", "", between(0.1, 10), EMIT_FIELD(film_factor),
-          "foster: factor on the film of the air of every face. Published correlations differ by 30 "
-          "%."),
+      number<ThermalOptions>("film_factor", "", between(0.1, 10), EMIT_FIELD(film_factor),
+                             "foster: factor on the film of the air of every face. Published "
+                             "correlations differ by 30 "
+                             "%."),
       boolean<ThermalOptions>("lateral", EMIT_FIELD(lateral),
                               "cached with foster: heat is also conducted along the surface and "
                               "across convex edges. emit2014 conducts straight down."),

@@ -73,9 +73,8 @@ const std::vector<SectionDoc>& scenario_sections() {
                   "The exhaust jet of an object ([gas.md](../renderer/docs/gas.md)): a throttle "
                   "of a part drives it.",
                   plume_keys(), scene::PlumeDesc{}),
-      section_doc("flare", true,
-                  "A decoy that burns from the instant at which its object appears.", flare_keys(),
-                  scene::FlareDesc{}),
+      section_doc("flare", true, "A decoy that burns from the instant at which its object appears.",
+                  flare_keys(), scene::FlareDesc{}),
       section_doc("smoke", true, "A cloud that a source gives off and the wind carries away.",
                   smoke_keys(), scene::SmokeDesc{}),
       section_doc("fire", true, "The flame of a fire on the ground or on an object.", fire_keys(),

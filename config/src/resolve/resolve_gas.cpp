@@ -28,8 +28,8 @@ void check_object(const Node& node, const std::string& name, const Known& known,
   if (object == nullptr) {
     std::vector<std::string> names;
     for (const scene::ObjectDesc& entry : known.objects) names.push_back(entry.name);
-    diagnostics.add(key_location(node, "object"), fmt::format("no object is named '{}'{}", name,
-                                                              did_you_mean(name, names)));
+    diagnostics.add(key_location(node, "object"),
+                    fmt::format("no object is named '{}'{}", name, did_you_mean(name, names)));
   } else if (object->instances.size() != 1) {
     diagnostics.add(key_location(node, "object"),
                     fmt::format("object '{}' stands in {} places: gas needs an object with one",
@@ -69,10 +69,16 @@ void check(const Node& node, scene::PlumeDesc& plume, const Known& known,
                     fmt::format("object '{}' has no part '{}'{}", object->name, plume.part,
                                 did_you_mean(plume.part, names)));
   } else if (!part->curve.given) {
-    diagnostics.add(key_location(node, "part"),
-                    fmt::format("part '{}' takes no throttle: it has no 'idle_k' and 'full_k'",
-                                plume.part));
+    diagnostics.add(
+        key_location(node, "part"),
+        fmt::format("part '{}' takes no throttle: it has no 'idle_k' and 'full_k'", plume.part));
   }
+}
+
+/// True if an entity is off at some time of the scenario.
+bool appears(const scene::ObjectDesc& object) {
+  if (object.trajectory.empty()) return !object.on;
+  return std::ranges::any_of(object.trajectory, [](const auto& key) { return !key.on; });
 }
 
 void check(const Node& node, scene::FlareDesc& flare, const Known& known,
@@ -83,6 +89,12 @@ void check(const Node& node, scene::FlareDesc& flare, const Known& known,
     diagnostics.add(key_location(node, "object"),
                     fmt::format("object '{}' is no entity: a flare burns from the instant at "
                                 "which its entity appears",
+                                flare.object));
+  } else if (object != nullptr && !appears(*object)) {
+    diagnostics.add(key_location(node, "object"),
+                    fmt::format("entity '{}' is there from the beginning, so that its flare has "
+                                "burnt out before the first frame: give it on = false, or a "
+                                "trajectory that begins with on = false",
                                 flare.object));
   }
 }

@@ -9,8 +9,8 @@
 #include <cmath>
 
 #include "emit/physics/air_film.hpp"
-#include "emit/physics/constants.hpp"
 #include "emit/physics/climate/gusts.hpp"
+#include "emit/physics/constants.hpp"
 #include "emit/reference/layer_mesh.hpp"
 #include "emit/reference/layer_solver.hpp"
 

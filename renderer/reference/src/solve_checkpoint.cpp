@@ -223,7 +223,8 @@ Result<std::optional<Checkpoint>> load_checkpoint(const std::filesystem::path& f
       {header.print.materials == print.materials, "materials"},
       {header.print.geometry == print.geometry, "geometry"},
       {header.print.contacts == print.contacts, "contacts"},
-      {header.print.thermal == print.thermal, "start of the history, spin-up, thermal.exchange or thermal.film_factor"},
+      {header.print.thermal == print.thermal,
+       "start of the history, spin-up, thermal.exchange or thermal.film_factor"},
       {header.print.options == print.options, "rays, refinement, tolerance or the last instant"},
   }};
   std::string differs;

@@ -29,19 +29,20 @@ float gas_image_column(vec2 away, vec3 covariance, vec2 side) {
 }
 
 // Density along a line of sight: x = square of the distance of the line from the middle, in standard deviations, y =
-// distance from the sensor to the densest place, z = standard deviation along the line. `axis` holds the axis and what
-// 1 / variance along it exceeds that across it, `across`.
+// distance from the sensor to the densest place, z = standard deviation along the line. `axis` holds the axis and 1 /
+// variance along it, `across` is 1 / variance across it. Parts along and across are added up and never subtracted,
+// because long and thin puffs would lose their digits.
 vec3 gas_line(vec3 ray, vec3 middle, float across, vec4 axis) {
-  float ray_axis = dot(ray, axis.xyz);
-  float middle_axis = dot(middle, axis.xyz);
-  float along = dot(ray, middle);
-  float a = across + axis.w * ray_axis * ray_axis;
-  float b = across * along + axis.w * ray_axis * middle_axis;
+  float ray_along = dot(ray, axis.xyz);
+  float middle_along = dot(middle, axis.xyz);
+  vec3 ray_across = ray - ray_along * axis.xyz;
+  vec3 middle_across = middle - middle_along * axis.xyz;
+  float a = across * dot(ray_across, ray_across) + axis.w * ray_along * ray_along;
+  float b = across * dot(ray_across, middle_across) + axis.w * ray_along * middle_along;
   float place = b / a;
-  // Take the square at the densest place itself, because a difference of large squares would lose its digits.
-  vec3 off = place * ray - middle;
-  float off_axis = dot(off, axis.xyz);
-  return vec3(across * dot(off, off) + axis.w * off_axis * off_axis, place, inversesqrt(a));
+  vec3 off_across = place * ray_across - middle_across;
+  float off_along = place * ray_along - middle_along;
+  return vec3(across * dot(off_across, off_across) + axis.w * off_along * off_along, place, inversesqrt(a));
 }
 
 // Share of the column that lies between the sensor and a surface, by the distances along the line of sight in standard

@@ -16,11 +16,13 @@ layout(binding = EMIT_TEX_DEPTH) uniform sampler2D depth_texture;
 layout(binding = EMIT_TEX_GAS_PUFFS) uniform samplerBuffer puff_texels;
 layout(std430, binding = EMIT_BIND_GAS_TILES) readonly buffer Tiles { GasTile tiles[]; };
 
-const int kTexelsPerPuff = 5 + EMIT_MAX_BANDS;
+const int kTexelsPerPuff = 6 + EMIT_MAX_BANDS;
 
-// Gas of one line of sight from the sensor on, by band and spectral term: what it lets through and what it adds.
+// Gas of one line of sight from the sensor on, by band and spectral term: what it lets through, the share of what lies
+// behind that it takes away from the aperture, and what it adds there.
 struct Gas {
   vec4 through[EMIT_BANDS];
+  vec4 taken[EMIT_BANDS];
   vec4 added[EMIT_BANDS];
 };
 
@@ -42,17 +44,23 @@ float column(int puff, vec2 px, vec3 ray, vec2 side_px, float surface_m) {
 
 void add_puff(inout Gas gas, int puff, float share) {
   bool flare = (uint(texelFetch(puff_texels, puff).w) & EMIT_GAS_FLARE) != 0u;
-  vec4 source = texelFetch(puff_texels, puff + 4);
+  vec4 air_share = texelFetch(puff_texels, puff + 4);
+  vec4 source = texelFetch(puff_texels, puff + 5);
   for (int i = 0; i < EMIT_BANDS; ++i) {
-    vec4 passed = exp(-share * texelFetch(puff_texels, puff + 5 + i));
+    vec4 passed = exp(-share * texelFetch(puff_texels, puff + 6 + i));
     vec4 emitted = flare ? vec4(share) : 1.0 - passed;
-    gas.added[i] += gas.through[i] * emitted * source[i];
+    // Where the air has taken the spectrum of the gas away, gas neither adds nor takes.
+    vec4 counted = gas.through[i] * air_share[i];
+    gas.added[i] += counted * emitted * source[i];
+    gas.taken[i] += counted * (1.0 - passed);
     gas.through[i] *= passed;
   }
 }
 
 void main() {
-  uint tile = image.first_tile + gl_WorkGroupID.x;
+  uint index = gl_WorkGroupID.y * EMIT_GAS_DISPATCH_COLUMNS + gl_WorkGroupID.x;
+  if (index >= image.tiles) return;
+  uint tile = image.first_tile + index;
   uvec4 tile_place = tiles[tile].place;
   ivec2 px = ivec2(tile_place.xy + gl_LocalInvocationID.xy);
   if (any(lessThan(px, ivec2(image.window_px.xy))) || any(greaterThanEqual(px, ivec2(image.window_px.zw)))) return;
@@ -82,6 +90,7 @@ void main() {
     Gas gas;
     for (int i = 0; i < EMIT_BANDS; ++i) {
       gas.through[i] = vec4(1.0);
+      gas.taken[i] = vec4(0.0);
       gas.added[i] = vec4(0.0);
     }
     for (int word = 0; word < 4 * EMIT_GAS_PUFF_BITS; ++word) {
@@ -93,7 +102,7 @@ void main() {
       }
     }
     for (int i = 0; i < EMIT_BANDS; ++i) {
-      through[i] += dot(image.term_frac[i], gas.through[i]);
+      through[i] += 1.0 - dot(image.term_frac[i], gas.taken[i]);
       added[i] += dot(image.term_frac[i], gas.added[i]);
     }
   }

@@ -84,6 +84,7 @@
 #define EMIT_MAX_GAS_PUFFS 256
 #define EMIT_GAS_PUFF_BITS 2
 #define EMIT_GAS_TILE 16u
+#define EMIT_GAS_DISPATCH_COLUMNS 32768u  // tiles in a row of work groups
 #define EMIT_GAS_SMALL 1u  // the image of the puff is a few pixels wide
 #define EMIT_GAS_FLARE 2u  // it emits and absorbs nothing
 #define EMIT_GAS_FAR_M 1e7f

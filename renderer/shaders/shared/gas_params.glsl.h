@@ -15,7 +15,8 @@ struct GasPuff {
   vec3 centre_m;               // from the sensor, in its axes
   float per_across_m2;         // 1 / variance across the axis
   vec3 axis;                   // unit vector, in the sensor's axes
-  float more_per_along_m2;     // 1 / variance along the axis, less that across
+  float per_along_axis_m2;     // 1 / variance along the axis
+  vec4 air_share_frac;         // by band: air's transmittance for its spectrum, by that for a blackbody of its temperature
   vec4 source_w_m2_sr;         // by band: opaque gas as the sensor sees it through the air, or the middle of a flare
   vec4 depth[EMIT_MAX_BANDS];  // by band: optical depth through the centre, by spectral term
 };
@@ -33,6 +34,10 @@ struct GasImage {
   uint plane_px;         // pixels of a plane
   uint first_tile;       // in the list of tiles
   float near_m;          // boresight distance at which the depth buffer holds 1
+  uint tiles;            // number of tiles of this image
+  uint unused0;
+  uint unused1;
+  uint unused2;
   vec4 term_frac[EMIT_MAX_BANDS];  // by band: share of the spectral terms; they add up to 1
 };
 
@@ -43,15 +48,17 @@ struct GasTile {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(GasPuff) == 80 + 16 * EMIT_MAX_BANDS);
+static_assert(sizeof(GasPuff) == 96 + 16 * EMIT_MAX_BANDS);
 EMIT_SHARED_OFFSET(GasPuff, covariance_px2, 16);
 EMIT_SHARED_OFFSET(GasPuff, centre_m, 32);
 EMIT_SHARED_OFFSET(GasPuff, axis, 48);
-EMIT_SHARED_OFFSET(GasPuff, source_w_m2_sr, 64);
-EMIT_SHARED_OFFSET(GasPuff, depth, 80);
-static_assert(sizeof(GasImage) == 80 + 16 * EMIT_MAX_BANDS);
+EMIT_SHARED_OFFSET(GasPuff, air_share_frac, 64);
+EMIT_SHARED_OFFSET(GasPuff, source_w_m2_sr, 80);
+EMIT_SHARED_OFFSET(GasPuff, depth, 96);
+static_assert(sizeof(GasImage) == 96 + 16 * EMIT_MAX_BANDS);
 EMIT_SHARED_OFFSET(GasImage, window_px, 48);
 EMIT_SHARED_OFFSET(GasImage, near_m, 76);
+EMIT_SHARED_OFFSET(GasImage, term_frac, 96);
 static_assert(sizeof(GasTile) == 16 + 16 * EMIT_GAS_PUFF_BITS);
 #endif
 

@@ -131,8 +131,7 @@ std::uint64_t weather_hash(const scene::ScenarioDesc& scenario) {
 std::uint64_t thermal_hash(const scene::ThermalOptions& o) {
   Fnv64 hash;
   add(hash, o.model, o.tolerance_k, o.initial_k, o.history_start_ns, o.spin_up_ns, o.foster_modes,
-      o.steps, o.spacing, o.first_step_s, o.max_samples, o.lateral, o.exchange,
-      o.film_factor);
+      o.steps, o.spacing, o.first_step_s, o.max_samples, o.lateral, o.exchange, o.film_factor);
   return hash.value();
 }
 

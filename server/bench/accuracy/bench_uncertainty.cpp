@@ -54,7 +54,7 @@ void for_materials(ScenarioDesc& scenario, const auto& change) {
 }
 
 /// Half-width of a number of a material: what its source states, else `otherwise`.
-double spread_of(const Material& material, double scene::MaterialSpread::* member,
+double spread_of(const Material& material, double scene::MaterialSpread::*member,
                  double otherwise) {
   const double stated = material.spread ? (*material.spread).*member : 0.0;
   return stated > 0.0 ? stated : otherwise;
@@ -90,9 +90,8 @@ constexpr Input kInputs[] = {
     {"humidity", "0.1", "a station at some distance",
      [](ScenarioDesc& s, double sign) {
        for_rows(s, [&](auto& row) {
-         if (!row.relative_humidity_frac) return;
          row.relative_humidity_frac =
-             std::clamp(*row.relative_humidity_frac + 0.1 * sign, 0.0, 1.0);
+             std::clamp(row.relative_humidity_frac.value_or(0.6) + 0.1 * sign, 0.0, 1.0);
        });
      }},
     {"absorptance", "of the library, else 0.05", "material library",
@@ -131,7 +130,8 @@ constexpr Input kInputs[] = {
      [](ScenarioDesc& s, double sign) {
        for_materials(s, [&](Material& m) {
          const double by = spread_of(m, &scene::MaterialSpread::heat_capacity_frac, 0.1);
-         for (scene::Layer& layer : m.layers) layer.specific_heat_j_kg_k *= std::pow(1.0 + by, sign);
+         for (scene::Layer& layer : m.layers)
+           layer.specific_heat_j_kg_k *= std::pow(1.0 + by, sign);
        });
      }},
     {"deep ground", "4 K", "climate by latitude against eleven typical years",
@@ -143,7 +143,9 @@ constexpr Input kInputs[] = {
     {"water vapour of the air", "20 %", "climate against a day's sounding",
      [](ScenarioDesc& s, double sign) {
        for (scene::BandAtmosphere& band : s.atmosphere.bands) {
-         if (band.model) band.model->water_ratio *= std::pow(1.2, sign);
+         if (band.model) {
+           band.model->water_ratio = std::min(5.0, band.model->water_ratio * std::pow(1.2, sign));
+         }
        }
      }},
 };
@@ -152,11 +154,23 @@ constexpr Input kInputs[] = {
 /// that every number of it can be changed. Modes of materials follow from their layers for the same
 /// reason.
 void make_changeable(ScenarioDesc& scenario, std::int64_t end_ns) {
+  scenario.thermal.state_file.clear();
   for_materials(scenario, [](Material& m) {
+    if (m.layers.empty()) return;
     m.foster_modes.clear();
     m.foster_fit.reset();
   });
-  if (!scenario.weather.empty()) return;
+  if (!scenario.weather.empty()) {
+    // Rows without humidity have that of the usual dew point.
+    const double dew_point_k = scene::usual_dew_point_k(scenario);
+    for_rows(scenario, [&](scene::WeatherSample& row) {
+      if (row.relative_humidity_frac) return;
+      row.relative_humidity_frac =
+          physics::saturation_over_water_pa(std::min(dew_point_k, row.air_k)) /
+          physics::saturation_over_water_pa(row.air_k);
+    });
+    return;
+  }
   constexpr std::int64_t kStepNs = 600'000'000'000;
   const physics::GeoPlace place{physics::Radians(scenario.place.lat_rad),
                                 physics::Radians(scenario.place.lon_rad),
@@ -245,6 +259,8 @@ struct Effect {
   Shift low;
   Shift high;
   [[nodiscard]] double rms_k() const { return std::max(low.rms_k, high.rms_k); }
+  /// False if the scenario has nothing that the input could change.
+  [[nodiscard]] bool acts() const { return rms_k() > 0.0; }
 };
 
 /// All effects of a band, the largest first.
@@ -263,9 +279,10 @@ Result<std::vector<BandEffects>> study(const UncertaintyOptions& options, double
   auto base = load_scenario_choice({options.scenario, options.set});
   if (!base) return tl::unexpected(std::move(base.error()));
   if (base->thermal.model != scene::ThermalModel::foster) {
-    return make_error(ErrorCode::config,
-                      "bench uncertainty needs thermal.model = \"foster\": the model emit2014 takes "
-                      "no film and no deep ground");
+    return make_error(
+        ErrorCode::config,
+        "bench uncertainty needs thermal.model = \"foster\": the model emit2014 takes "
+        "no film and no deep ground");
   }
   const std::int64_t time_ns = options.time_s
                                    ? static_cast<std::int64_t>(std::llround(*options.time_s * 1e9))
@@ -309,6 +326,7 @@ Plot tornado_of(const UncertaintyOptions& options, double time_s, const BandEffe
             .y = {.label = "mean shift of the surfaces, K"}};
   PlotSeries bars{.label = "low to high end"};
   for (const Effect& effect : band.effects) {
+    if (!effect.acts()) continue;
     plot.x.names.push_back(effect.input->name);
     const auto [low, high] = std::minmax(effect.low.mean_k, effect.high.mean_k);
     bars.points.push_back(
@@ -343,8 +361,17 @@ int run(const UncertaintyOptions& options) {
     TextTable table({"input", "range", "mean low K", "mean high K", "rms K", "p99 K"});
     Json inputs = Json::array();
     for (const Effect& effect : band.effects) {
-      table.add({effect.input->name, effect.input->range,
-                 fmt::format("{:+.2f}", effect.low.mean_k),
+      if (!effect.acts()) {
+        table.add({effect.input->name, effect.input->range, "no effect", "", "", ""});
+        inputs.push(Json::object()
+                        .set("input", effect.input->name)
+                        .set("range", effect.input->range)
+                        .set("source", effect.input->source)
+                        .set("low", nullptr)
+                        .set("high", nullptr));
+        continue;
+      }
+      table.add({effect.input->name, effect.input->range, fmt::format("{:+.2f}", effect.low.mean_k),
                  fmt::format("{:+.2f}", effect.high.mean_k), fmt::format("{:.2f}", effect.rms_k()),
                  fmt::format("{:.2f}", std::max(effect.low.p99_k, effect.high.p99_k))});
       inputs.push(Json::object()

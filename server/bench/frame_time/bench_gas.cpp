@@ -141,11 +141,12 @@ void add_options(CommandLine& line, GasOptions& options) {
 }  // namespace
 
 void add_bench_gas(CommandLine& bench) {
-  bench.command<GasOptions>({.name = "gas",
-                             .text = "What plumes, flares, smoke and fires of a scenario add to the "
-                                     "frame time, each kind alone and all together",
-                             .example = "emit bench gas --json gas.json"},
-                            add_options, run);
+  bench.command<GasOptions>(
+      {.name = "gas",
+       .text = "What plumes, flares, smoke and fires of a scenario add to the "
+               "frame time, each kind alone and all together",
+       .example = "emit bench gas --json gas.json"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

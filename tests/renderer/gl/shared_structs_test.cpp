@@ -7,8 +7,8 @@
 #include "gl/egl_context.hpp"
 #include "gl/program.hpp"
 #include "shared/frame_params.glsl.h"
-#include "shared/shade_params.glsl.h"
 #include "shared/gas_params.glsl.h"
+#include "shared/shade_params.glsl.h"
 #include "shared/target_params.glsl.h"
 
 namespace emit::renderer {

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "emit/physics/constants.hpp"
+#include "emit/physics/gas/jet.hpp"
 #include "emit/physics/gas/puff.hpp"
 #include "emit/physics/gas/spectrum.hpp"
-#include "emit/physics/gas/jet.hpp"
 
 /// Spectra of hot gas, jets and puffs against published correlations and quadrature.
 namespace emit::physics {
@@ -20,9 +20,8 @@ namespace {
 /// c_ji (T / 1000 K)^j (log10 of p L in bar cm)^i.
 double leckner_emissivity(bool water, double kelvin, double bar_cm) {
   using Rows = std::vector<std::vector<double>>;
-  static const Rows kWater{{-2.2118, -1.1987, 0.035596},
-                           {0.85667, 0.93048, -0.14391},
-                           {-0.10838, -0.17156, 0.045915}};
+  static const Rows kWater{
+      {-2.2118, -1.1987, 0.035596}, {0.85667, 0.93048, -0.14391}, {-0.10838, -0.17156, 0.045915}};
   static const Rows kCarbon{{-3.9893, 2.7669, -2.1081, 0.39163},
                             {1.2710, -1.1090, 1.0195, -0.21897},
                             {-0.23678, 0.19731, -0.19544, 0.044644}};
@@ -52,8 +51,8 @@ TEST(GasSpectrum, TotalEmissivityIsThatOfLecknersChart) {
         squares += std::pow(model / chart - 1.0, 2);
         ++count;
         EXPECT_NEAR(model / chart, 1.0, 0.22)
-            << (water ? "water " : "carbon dioxide ") << kelvin << " K, " << bar_cm << " bar cm: "
-            << model << ", chart " << chart;
+            << (water ? "water " : "carbon dioxide ") << kelvin << " K, " << bar_cm
+            << " bar cm: " << model << ", chart " << chart;
       }
     }
   }
@@ -93,15 +92,16 @@ TEST(GasBand, TermsFollowTheAbsorptanceFromThinToThick) {
       for (std::size_t t = 0; t < kGasTerms; ++t) {
         sum -= terms->share_frac()[t] * std::expm1(-terms->depth()[t] * per_m * path_m);
       }
-      worst = std::max(worst,
-                       std::abs(sum / gas_absorptance(gas, band, gas.kelvin, path_m) - 1.0));
+      worst = std::max(worst, std::abs(sum / gas_absorptance(gas, band, gas.kelvin, path_m) - 1.0));
     }
     EXPECT_LT(worst, 0.08) << lo << " to " << hi << " um";
     EXPECT_LT(terms->fit_error_frac(), 0.08) << lo << " to " << hi << " um";
   }
 }
 
-TEST(GasBand, RefusesABandThatIsNone) { EXPECT_FALSE(GasBand::build({5.0, 3.0, {}}, {})); }
+TEST(GasBand, RefusesABandThatIsNone) {
+  EXPECT_FALSE(GasBand::build({5.0, 3.0, {}}, {}));
+}
 
 std::vector<JetNode> nodes_of(const JetExit& exit, const JetAir& air, double last_frac = 0.02) {
   std::vector<JetNode> nodes(200);
@@ -111,7 +111,8 @@ std::vector<JetNode> nodes_of(const JetExit& exit, const JetAir& air, double las
 
 TEST(Jet, FarFromTheNozzleDecaysAndSpreadsAsMeasured) {
   // Measured in round jets of air: a passive scalar on the axis is 5.0 to 5.6 D / x, and falls to
-  // half at 0.11 to 0.13 x from the axis (Dowling and Dimotakis 1990; Pope, Turbulent Flows, ch. 5).
+  // half at 0.11 to 0.13 x from the axis (Dowling and Dimotakis 1990; Pope, Turbulent Flows, ch.
+  // 5).
   const auto nodes = nodes_of({.radius_m = 0.5, .speed_m_s = 50.0, .kelvin = 300.0},
                               {.kelvin = 300.0, .along_m_s = 0.0});
   const JetNode& far = nodes.back();
@@ -131,8 +132,7 @@ TEST(Jet, KeepsItsExhaustGas) {
     const double edge_m = 7.0 * node.sigma_m;
     for (int i = 0; i < kRings; ++i) {
       const double radius_m = edge_m * (i + 0.5) / kRings;
-      const double frac =
-          node.exhaust_frac * std::exp(-0.5 * std::pow(radius_m / node.sigma_m, 2));
+      const double frac = node.exhaust_frac * std::exp(-0.5 * std::pow(radius_m / node.sigma_m, 2));
       mass += frac / jet_k(exit, air, frac) * 2.0 * kPi * radius_m * edge_m / kRings;
     }
     const double nozzle = kPi * exit.radius_m * exit.radius_m / exit.kelvin;
@@ -175,10 +175,10 @@ TEST(GasPuff, LineHasTheColumnOfItsDensity) {
   const float across_m = 1.5F;
   const float along_m = 4.0F;
   const float per_across = 1.0F / (across_m * across_m);
-  const float more = 1.0F / (along_m * along_m) - per_across;
+  const float per_along = 1.0F / (along_m * along_m);
   for (const float x : {-0.1F, 0.0F, 0.06F, 0.2F}) {
     const glm::vec3 ray = glm::normalize(glm::vec3(x, -0.05F, 1.0F));
-    const GasLine line = gas_line(ray, middle_m, per_across, axis, more);
+    const GasLine line = gas_line(ray, middle_m, per_across, axis, per_along);
     for (const float surface_m : {20.0F, 39.0F, 41.0F, 300.0F}) {
       double column = 0.0;
       constexpr int kSteps = 20000;
@@ -198,6 +198,17 @@ TEST(GasPuff, LineHasTheColumnOfItsDensity) {
   }
 }
 
+TEST(GasPuff, LineAlongALongThinPuffKeepsItsDigits) {
+  // Looked at along the axis, the standard deviation along the line is that of the axis.
+  for (const float along_m : {10.0F, 300.0F, 3000.0F, 30'000.0F}) {
+    const glm::vec3 axis = glm::normalize(glm::vec3(0.3F, -0.2F, 1.0F));
+    const GasLine line = gas_line(axis, 500.0F * axis, 1.0F, axis, 1.0F / (along_m * along_m));
+    EXPECT_NEAR(line.sigma_m / along_m, 1.0F, 1e-2F) << along_m;
+    EXPECT_NEAR(line.place_m, 500.0F, 1.0F) << along_m;
+    EXPECT_LT(line.square, 1e-3F);
+  }
+}
+
 TEST(GasPuff, ImageKeepsItsSumOnAnyGrid) {
   // A tilted Gaussian of at least 0.7 samples each way, at any place: the sum over the samples is
   // its integral.
@@ -211,8 +222,7 @@ TEST(GasPuff, ImageKeepsItsSumOnAnyGrid) {
       }
     }
     const double integral =
-        2.0 * kPi *
-        std::sqrt(covariance.x * covariance.z - double{covariance.y} * covariance.y);
+        2.0 * kPi * std::sqrt(covariance.x * covariance.z - double{covariance.y} * covariance.y);
     EXPECT_NEAR(sum / integral, 1.0, 2e-4) << place;
   }
 }

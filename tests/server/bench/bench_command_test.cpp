@@ -94,11 +94,10 @@ TEST(CliBench, ACrowdIsMeasuredBesideTheSceneWithoutIt) {
 
 TEST(CliBench, GasIsMeasuredBesideTheSceneWithoutIt) {
   const TemporaryFolder folder;
-  const ProcessResult run = run_emit({"bench", "gas", "--pairs", "15", "--set",
-                                      "thermal.tolerance_k=50", "--set", "thermal.steps=3", "--set",
-                                      "thermal.history_start_s=-600", "--set", "sensor.width_px=64",
-                                      "--set", "sensor.height_px=48", "--json",
-                                      folder.file("g.json")});
+  const ProcessResult run = run_emit(
+      {"bench", "gas", "--pairs", "15", "--set", "thermal.tolerance_k=50", "--set",
+       "thermal.steps=3", "--set", "thermal.history_start_s=-600", "--set", "sensor.width_px=64",
+       "--set", "sensor.height_px=48", "--json", folder.file("g.json")});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const std::string json = read_text(folder.file("g.json"));
   EXPECT_EQ(json_value(json, "suite"), "\"gas\"");
@@ -109,10 +108,10 @@ TEST(CliBench, GasIsMeasuredBesideTheSceneWithoutIt) {
 
 TEST(CliBench, UncertaintyMovesEveryInputBothWays) {
   const TemporaryFolder folder;
-  const ProcessResult run = run_emit(
-      {"bench", "uncertainty", "box", "--set", "thermal.tolerance_k=20", "--set", "thermal.steps=6",
-       "--set", "sensor.width_px=48", "--set", "sensor.height_px=36", "--json",
-       folder.file("u.json"), "--plot", folder.file("u.svg")});
+  const ProcessResult run =
+      run_emit({"bench", "uncertainty", "box", "--set", "thermal.tolerance_k=20", "--set",
+                "thermal.steps=6", "--set", "sensor.width_px=48", "--set", "sensor.height_px=36",
+                "--json", folder.file("u.json"), "--plot", folder.file("u.svg")});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const std::string json = read_text(folder.file("u.json"));
   EXPECT_EQ(json_value(json, "suite"), "\"uncertainty\"");
@@ -122,8 +121,13 @@ TEST(CliBench, UncertaintyMovesEveryInputBothWays) {
     EXPECT_GT(k, 1.0);
     EXPECT_LT(k, 20.0);
   }
-  // Every input has a mean shift at either end, in every band.
-  EXPECT_EQ(numbers_of(json, "mean_k").size(), 24 * all_k.size());
+  // Nearly every input moves the mean, and its ends move it opposite ways.
+  const std::vector<double> means_k = numbers_of(json, "mean_k");
+  std::size_t opposite = 0;
+  for (std::size_t i = 0; i + 1 < means_k.size(); i += 2) {
+    opposite += means_k[i] * means_k[i + 1] < 0.0 ? 1U : 0U;
+  }
+  EXPECT_GE(opposite, 9 * all_k.size()) << json;
   EXPECT_NE(read_text(folder.file("u.svg")).find("film of the air"), std::string::npos);
 }
 

@@ -36,8 +36,7 @@ void jet_nodes(const JetExit& exit, const JetAir& air, double last_frac,
     // Turn the flat profiles into Gaussian ones that carry the same: a jet of its own speed holds
     // more gas than the flat one, because its edge is slow.
     const double radius2_m2 = exit_flow * flow / (density * node.speed_m_s);
-    const double own =
-        std::clamp((node.speed_m_s - air.along_m_s) / node.speed_m_s, 0.0, 1.0);
+    const double own = std::clamp((node.speed_m_s - air.along_m_s) / node.speed_m_s, 0.0, 1.0);
     constexpr double kHeld = (1.0 + kSpread * kSpread) / (kSpread * kSpread);
     const double held = 1.0 + own * (kHeld * kSpread * kSpread / 2.0 - 1.0);
     node.exhaust_frac = std::min(1.0, share * held * 2.0 / (kSpread * kSpread));

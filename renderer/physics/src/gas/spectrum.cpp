@@ -55,7 +55,9 @@ constexpr std::array<std::array<double, 3>, 2> kVibrationPerCm{
     {{1351.0, 667.0, 2396.0}, {3652.0, 1595.0, 3756.0}}};
 constexpr std::array<std::array<int, 3>, 2> kDegeneracy{{{1, 2, 1}, {1, 1, 1}}};
 
-double factorial(int n) { return std::tgamma(n + 1.0); }
+double factorial(int n) {
+  return std::tgamma(n + 1.0);
+}
 
 /// Sums over the levels of all vibrations of a molecule at a temperature.
 struct Levels {
@@ -97,13 +99,11 @@ struct BandNow {
 };
 BandNow band_now(const WideBand& band, const GasState& gas) {
   const bool rotation = band.change == std::array<int, 3>{0, 0, 0};
-  const double frac =
-      band.molecule == 0 ? gas.mixture.co2_frac : gas.mixture.h2o_frac;
+  const double frac = band.molecule == 0 ? gas.mixture.co2_frac : gas.mixture.h2o_frac;
   const double broadening =
       band.molecule == 0 ? 1.3 : 8.6 * std::sqrt(kEdwardsK / gas.kelvin) + 0.5;
-  const double pressure =
-      std::pow(gas.pressure_pa / kAtmospherePa * (1.0 + (broadening - 1.0) * frac),
-               band.pressure_exponent);
+  const double pressure = std::pow(
+      gas.pressure_pa / kAtmospherePa * (1.0 + (broadening - 1.0) * frac), band.pressure_exponent);
   BandNow out;
   out.width_per_cm = band.width_per_cm * std::sqrt(gas.kelvin / kEdwardsK);
   if (rotation) {
@@ -139,8 +139,7 @@ struct GasNow {
     for (std::size_t i = 0; i < kBands.size(); ++i) bands[i] = band_now(kBands[i], gas);
     const std::array<double, 2> frac{gas.mixture.co2_frac, gas.mixture.h2o_frac};
     for (std::size_t m = 0; m < 2; ++m) {
-      density_g_m3[m] =
-          frac[m] * gas.pressure_pa / (kGasConstant * gas.kelvin) * kMolarMassG[m];
+      density_g_m3[m] = frac[m] * gas.pressure_pa / (kGasConstant * gas.kelvin) * kMolarMassG[m];
     }
   }
   [[nodiscard]] std::array<GasLines, 2> at(double wavenumber_per_cm) const {
@@ -152,8 +151,7 @@ struct GasNow {
       const double widths = (band.head ? 1.0 : 2.0) * std::abs(away) / bands[i].width_per_cm;
       if (widths > kWing) continue;
       const double per_m = bands[i].intensity / bands[i].width_per_cm / (1.0 + kLevel) *
-                           std::exp(-std::max(0.0, widths - kLevel)) *
-                           density_g_m3[band.molecule];
+                           std::exp(-std::max(0.0, widths - kLevel)) * density_g_m3[band.molecule];
       GasLines& lines = out[band.molecule];
       lines.absorption_per_m += per_m;
       lines.overlap += per_m * bands[i].overlap;
@@ -181,13 +179,13 @@ std::vector<Point> points_over(const Band& band, double source_k) {
   constexpr double kStepPerCm = 5.0;
   const double low = 1e4 / band.hi_um;
   const double high = 1e4 / band.lo_um;
-  const auto count = static_cast<std::size_t>(
-      std::clamp(std::ceil((high - low) / kStepPerCm), 16.0, 4000.0));
+  const auto count =
+      static_cast<std::size_t>(std::clamp(std::ceil((high - low) / kStepPerCm), 16.0, 4000.0));
   std::vector<Point> out;
   double sum = 0.0;
   for (std::size_t i = 0; i < count; ++i) {
-    const double per_cm = low + (high - low) * (static_cast<double>(i) + 0.5) /
-                                    static_cast<double>(count);
+    const double per_cm =
+        low + (high - low) * (static_cast<double>(i) + 0.5) / static_cast<double>(count);
     const double um = 1e4 / per_cm;
     // A step of wavenumber is a step of wavelength times its square.
     const double weight = response_frac(band, um) * um * um *
@@ -216,8 +214,18 @@ std::array<GasLines, 2> gas_lines(const GasState& gas, double wavenumber_per_cm)
 }
 
 double gas_transmittance(const GasState& gas, double wavenumber_per_cm, double path_m) {
-  const auto lines = gas_lines(gas, wavenumber_per_cm);
-  return through_lines(lines[0], path_m) * through_lines(lines[1], path_m);
+  return gas_transmittances(gas, std::span(&wavenumber_per_cm, 1), path_m).front();
+}
+
+std::vector<double> gas_transmittances(const GasState& gas,
+                                       std::span<const double> wavenumbers_per_cm, double path_m) {
+  const GasNow now(gas);
+  std::vector<double> out;
+  for (const double per_cm : wavenumbers_per_cm) {
+    const auto lines = now.at(per_cm);
+    out.push_back(through_lines(lines[0], path_m) * through_lines(lines[1], path_m));
+  }
+  return out;
 }
 
 double gas_absorptance(const GasState& gas, const Band& band, double source_k, double path_m) {

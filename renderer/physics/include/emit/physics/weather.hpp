@@ -60,7 +60,7 @@ struct Forcing {
   double wind_to_north = 0.0;
   /// Gusts that convection adds in squares to the wind (gusts.hpp).
   double gust_m_s = 0.0;
-  double height_m = 0.0;  ///< of the place
+  double height_m = 0.0;     ///< of the place
   double film_factor = 1.0;  ///< multiplies the film of every face
   double cloud_frac = 0.0;
   /// Vapour pressure that the weather states, multiplied by its share, and that share: between a

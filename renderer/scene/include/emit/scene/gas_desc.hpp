@@ -55,7 +55,7 @@ struct FlareDesc {
   double kelvin = 2200.0;  ///< of the flame, for bands without an intensity of their own
   double area_m2 = 0.05;   ///< emissivity times area as seen from any side
   std::vector<BandValue> intensity_w_sr;  ///< at the height of the burn
-  double radius_m = 0.2;  ///< of the flame: two standard deviations
+  double radius_m = 0.2;                  ///< of the flame: two standard deviations
   double rise_s = 0.1;
   double burn_s = 4.0;  ///< at the height of the burn
   double fall_s = 1.0;
@@ -65,7 +65,7 @@ struct FlareDesc {
 struct SmokeDesc {
   static constexpr std::size_t kPuffs = 48;
   std::string name;
-  std::string object;  ///< what carries the source; empty: it stands at `position_m`
+  std::string object;          ///< what carries the source; empty: it stands at `position_m`
   glm::dvec3 position_m{0.0};  ///< in the world, or in the body of the object
   std::int64_t start_ns = kSinceEverNs;
   std::int64_t stop_ns = kForEverNs;

@@ -357,10 +357,10 @@ struct ThermalOptions {
   std::uint32_t filter_taps = 32;
   double obscurance_radius_m = 0.5;
   std::uint32_t max_samples =
-      1'000'000;         ///< cached: thermal samples, about 1.5 kB each at 27 steps
+      1'000'000;             ///< cached: thermal samples, about 1.5 kB each at 27 steps
   double film_factor = 1.0;  ///< foster: multiplies the film of the air on every face
-  bool lateral = true;   ///< cached: conduction along the surface and across convex edges
-  bool exchange = true;  ///< cached: faces exchange radiation with the faces that they see
+  bool lateral = true;       ///< cached: conduction along the surface and across convex edges
+  bool exchange = true;      ///< cached: faces exchange radiation with the faces that they see
   std::filesystem::path state_file;  ///< cached: file of the warmed-up state; empty: none
 };
 

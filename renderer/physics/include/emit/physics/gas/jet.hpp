@@ -21,14 +21,14 @@ struct JetAir {
 /// Cross-section of a jet: Gaussian around its axis.
 struct JetNode {
   double from_nozzle_m = 0.0;
-  double sigma_m = 0.0;      ///< standard deviation of the share of exhaust gas
+  double sigma_m = 0.0;       ///< standard deviation of the share of exhaust gas
   double exhaust_frac = 0.0;  ///< share of exhaust gas on the axis, 0..1
-  double speed_m_s = 0.0;    ///< mean over the section, against the nozzle
+  double speed_m_s = 0.0;     ///< mean over the section, against the nozzle
 };
 
 /// Writes the cross-sections of a jet from the nozzle to where the share of exhaust gas has fallen
-/// to about `last_frac`, at shares of equal ratio. Entrainment is that of Ricou and Spalding (1961);
-/// a twentieth of the air's speed adds to it, so that a jet as fast as the air mixes too.
+/// to about `last_frac`, at shares of equal ratio. Entrainment is that of Ricou and Spalding
+/// (1961); a twentieth of the air's speed adds to it, so that a jet as fast as the air mixes too.
 /// @pre out.size() >= 2, 0 < last_frac < 1
 void jet_nodes(const JetExit& exit, const JetAir& air, double last_frac,
                std::span<JetNode> out) noexcept;

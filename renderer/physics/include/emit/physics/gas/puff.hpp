@@ -30,13 +30,12 @@ namespace emit::physics {
 /// and their determinant is above 0. The rectangle counts as a Gaussian of its own variance.
 [[nodiscard]] inline float gas_image_column(const glm::vec2& away, const glm::vec3& covariance,
                                             const glm::vec2& side) noexcept {
-  const glm::vec3 wide =
-      covariance + glm::vec3(side.x * side.x, 0.0F, side.y * side.y) / 12.0F;
+  const glm::vec3 wide = covariance + glm::vec3(side.x * side.x, 0.0F, side.y * side.y) / 12.0F;
   const float before = covariance.x * covariance.z - covariance.y * covariance.y;
   const float after = wide.x * wide.z - wide.y * wide.y;
-  const float square = (away.x * away.x * wide.z - 2.0F * away.x * away.y * wide.y +
-                        away.y * away.y * wide.x) /
-                       after;
+  const float square =
+      (away.x * away.x * wide.z - 2.0F * away.x * away.y * wide.y + away.y * away.y * wide.x) /
+      after;
   return std::sqrt(before / after) * std::exp(-0.5F * square);
 }
 
@@ -46,21 +45,25 @@ struct GasLine {
   float place_m = 0.0F;  ///< distance from the sensor to the densest place
   float sigma_m = 0.0F;  ///< standard deviation along the line
 };
-/// Follows the unit vector `ray` from the sensor past a puff with its middle at `middle_m`.
-/// `per_across_m2` is 1 / variance across the axis, and 1 / variance along it is greater by
-/// `more_per_along_m2`.
+/// Follows the unit vector `ray` from the sensor past a puff with its middle at `middle_m`. Both
+/// 1 / variances, across and along the axis, are above 0. Parts along and across are added up and
+/// never subtracted, because long and thin puffs would lose their digits.
 [[nodiscard]] inline GasLine gas_line(const glm::vec3& ray, const glm::vec3& middle_m,
                                       float per_across_m2, const glm::vec3& axis,
-                                      float more_per_along_m2) noexcept {
-  const float ray_axis = glm::dot(ray, axis);
-  const float a = per_across_m2 + more_per_along_m2 * ray_axis * ray_axis;
-  const float b = per_across_m2 * glm::dot(ray, middle_m) +
-                  more_per_along_m2 * ray_axis * glm::dot(middle_m, axis);
+                                      float per_along_m2) noexcept {
+  const float ray_along = glm::dot(ray, axis);
+  const float middle_along_m = glm::dot(middle_m, axis);
+  const glm::vec3 ray_across = ray - ray_along * axis;
+  const glm::vec3 middle_across_m = middle_m - middle_along_m * axis;
+  const float a =
+      per_across_m2 * glm::dot(ray_across, ray_across) + per_along_m2 * ray_along * ray_along;
+  const float b = per_across_m2 * glm::dot(ray_across, middle_across_m) +
+                  per_along_m2 * ray_along * middle_along_m;
   const float place_m = b / a;
-  const glm::vec3 off_m = place_m * ray - middle_m;
-  const float off_axis_m = glm::dot(off_m, axis);
-  return {.square = per_across_m2 * glm::dot(off_m, off_m) +
-                    more_per_along_m2 * off_axis_m * off_axis_m,
+  const glm::vec3 off_across_m = place_m * ray_across - middle_across_m;
+  const float off_along_m = place_m * ray_along - middle_along_m;
+  return {.square = per_across_m2 * glm::dot(off_across_m, off_across_m) +
+                    per_along_m2 * off_along_m * off_along_m,
           .place_m = place_m,
           .sigma_m = 1.0F / std::sqrt(a)};
 }
