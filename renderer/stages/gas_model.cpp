@@ -241,19 +241,13 @@ Result<void> GasModel::build_air(const scene::ScenarioDesc& scenario) {
       physics::Band shaped = band;
       shaped.response.clear();
       constexpr std::size_t kPoints = 400;
-      std::vector<double> wavenumbers_per_cm;
-      for (std::size_t i = 0; i < kPoints; ++i) {
-        wavenumbers_per_cm.push_back(
-            1e4 / (band.lo_um + (band.hi_um - band.lo_um) * static_cast<double>(i) /
-                                    static_cast<double>(kPoints - 1)));
-      }
-      const std::vector<double> passed =
-          physics::gas_transmittances(exit, wavenumbers_per_cm, 2.0 * desc.radius_m);
       double most = 0.0;
       for (std::size_t i = 0; i < kPoints; ++i) {
-        const double um = 1e4 / wavenumbers_per_cm[i];
+        const double um = band.lo_um + (band.hi_um - band.lo_um) * static_cast<double>(i) /
+                                           static_cast<double>(kPoints - 1);
         const double emissivity =
-            1.0 - passed[i] * std::exp(-2.0 * desc.soot_per_m * desc.radius_m);
+            1.0 - physics::gas_transmittance(exit, 1e4 / um, 2.0 * desc.radius_m) *
+                      std::exp(-2.0 * desc.soot_per_m * desc.radius_m);
         shaped.response.push_back({um, emissivity * physics::response_frac(band, um)});
         most = std::max(most, shaped.response.back().response_frac);
       }

@@ -49,7 +49,7 @@ void add_puff(inout Gas gas, int puff, float share) {
   for (int i = 0; i < EMIT_BANDS; ++i) {
     vec4 passed = exp(-share * texelFetch(puff_texels, puff + 6 + i));
     vec4 emitted = flare ? vec4(share) : 1.0 - passed;
-    // Where the air has taken the spectrum of the gas away, gas neither adds nor takes.
+    // The air has taken a part of the spectrum of the gas away, in which gas neither adds nor takes.
     vec4 counted = gas.through[i] * air_share[i];
     gas.added[i] += counted * emitted * source[i];
     gas.taken[i] += counted * (1.0 - passed);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -214,18 +215,19 @@ std::array<GasLines, 2> gas_lines(const GasState& gas, double wavenumber_per_cm)
 }
 
 double gas_transmittance(const GasState& gas, double wavenumber_per_cm, double path_m) {
-  return gas_transmittances(gas, std::span(&wavenumber_per_cm, 1), path_m).front();
-}
-
-std::vector<double> gas_transmittances(const GasState& gas,
-                                       std::span<const double> wavenumbers_per_cm, double path_m) {
-  const GasNow now(gas);
-  std::vector<double> out;
-  for (const double per_cm : wavenumbers_per_cm) {
-    const auto lines = now.at(per_cm);
-    out.push_back(through_lines(lines[0], path_m) * through_lines(lines[1], path_m));
+  // Callers walk along a spectrum: keep the bands of the latest gas.
+  thread_local GasState latest;
+  thread_local std::optional<GasNow> bands;
+  const auto same = [&] {
+    return bands && latest.mixture == gas.mixture && latest.kelvin == gas.kelvin &&
+           latest.pressure_pa == gas.pressure_pa;
+  };
+  if (!same()) {
+    bands.emplace(gas);
+    latest = gas;
   }
-  return out;
+  const auto lines = bands->at(wavenumber_per_cm);
+  return through_lines(lines[0], path_m) * through_lines(lines[1], path_m);
 }
 
 double gas_absorptance(const GasState& gas, const Band& band, double source_k, double path_m) {

@@ -2,7 +2,6 @@
 #pragma once
 #include <array>
 #include <cstddef>
-#include <span>
 #include <vector>
 
 #include "emit/physics/error.hpp"
@@ -40,10 +39,6 @@ struct GasLines {
 /// Setup only.
 [[nodiscard]] double gas_transmittance(const GasState& gas, double wavenumber_per_cm,
                                        double path_m);
-/// Returns the same for many wavenumbers. Setup only.
-[[nodiscard]] std::vector<double> gas_transmittances(const GasState& gas,
-                                                     std::span<const double> wavenumbers_per_cm,
-                                                     double path_m);
 /// Returns the share of a blackbody's radiation in a band that a path through a gas emits, 0..1.
 /// The blackbody is as warm as `source_k`. Setup only.
 [[nodiscard]] double gas_absorptance(const GasState& gas, const Band& band, double source_k,
