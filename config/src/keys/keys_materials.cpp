@@ -269,7 +269,7 @@ const KeyTable<Material>& material_keys() {
       number<Material>(
           "wetness_frac", "", between(0, 1), EMIT_FIELD(wetness_frac),
           "foster: share of the evaporation of a surface that is moist all over: 1 open "
-          "water, 0 dry. A material with this key or the next evaporates."),
+          "water, 0 dry. See Evaporation."),
       number<Material>("surface_resistance_s_m", "s m-1", between(0, 1e4),
                        EMIT_FIELD(surface_resistance_s_m),
                        "foster: resistance between the water and the air at the surface, in "

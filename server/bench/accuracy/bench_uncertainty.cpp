@@ -323,8 +323,9 @@ Plot tornado_of(const UncertaintyOptions& options, double time_s, const BandEffe
   Plot plot{.title = fmt::format("{} at {:g} s, {} um: +-{:.2f} K RMS in all", options.scenario,
                                  time_s, band.band, band.all_k()),
             .x = {.label = "input"},
-            .y = {.label = "mean shift of the surfaces, K"}};
-  PlotSeries bars{.label = "low to high end"};
+            .y = {.label = "mean shift of the surfaces, K"},
+            .series = {}};
+  PlotSeries bars{.label = "low to high end", .points = {}};
   for (const Effect& effect : band.effects) {
     if (!effect.acts()) continue;
     plot.x.names.push_back(effect.input->name);
