@@ -288,9 +288,8 @@ const KeyTable<Material>& material_keys() {
       foster_modes_key(),
       foster_fit_key(),
       number<Material>("wetness_frac", "", between(0, 1), EMIT_FIELD(wetness_frac),
-                       "foster: share of the evaporation that the surface would have if it were "
-                       "moist all over. 1 is open water or soil after rain, 0 is dry. A material "
-                       "with this key or the next one evaporates and takes dew."),
+                       "foster: share of the evaporation of a surface that is moist all over: 1 "
+                       "for open water, 0 dry. See Evaporation."),
       number<Material>("surface_resistance_s_m", "s m-1", between(0, 1e4),
                        EMIT_FIELD(surface_resistance_s_m),
                        "foster: resistance between the water and the air at the surface, in "
@@ -300,9 +299,8 @@ const KeyTable<Material>& material_keys() {
                        "foster: the same without sunlight, when stomata are closed. Without it "
                        "that in sunlight counts."),
       boolean<Material>("dry_layers_valid", EMIT_FIELD(dry_layers_valid),
-                        "`false` says that heat also moves by melting, stirring, or an "
-                        "evaporation that the keys above do not give. Temperatures are then a "
-                        "guide only, and a warning says so."),
+                        "`false` says that heat also moves by melting or stirring. Temperatures "
+                        "are then a guide only, and a warning says so."),
       number<Material>(
           "prescribed_k", "K", between(100, 5000), EMIT_FIELD(prescribed_k),
           "Given temperature of a part, such as a hot engine. It has no thermal simulation."),

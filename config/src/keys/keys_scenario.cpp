@@ -145,8 +145,8 @@ const KeyTable<WeatherDraft>& weather_keys() {
           "Clear-sky models: amplitude of the daily cosine, which is warmest at 15:00 solar time."),
       open_default(number<WeatherDraft>(
           "dew_point_k", "K", between(180, 320), EMIT_FIELD(clear_sky.dew_point_k),
-          "Clear-sky models: dew point. It gives the long-wave emissivity of the sky and the "
-          "humidity of the air. Without it that of 60 % relative humidity.")),
+          "Clear-sky models: dew point, for the long waves of the sky and the humidity of the air. "
+          "Without it that of 60 %.")),
       number<WeatherDraft>("wind_m_s", "m s-1", between(limits::kWindMS),
                            EMIT_FIELD(clear_sky.wind_m_s), "Clear-sky models: wind speed."),
       number<WeatherDraft>("wind_from_deg", "deg", between(0, 360),

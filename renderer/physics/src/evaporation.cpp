@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "emit/physics/foster.hpp"
+
 namespace emit::physics {
 namespace {
 
@@ -36,7 +38,7 @@ MoistAir between_airs(const MoistAir& a, const MoistAir& b, double f) noexcept {
 double surface_resistance_s_m(const MoistSurface& surface, double shortwave_w_m2) noexcept {
   const double light_frac = std::clamp(shortwave_w_m2 / kOpenStomataWM2, 0.0, 1.0);
   if (!(surface.resistance_s_m > 0.0) || light_frac == 1.0) {
-    // Without a resistance by day there are no stomata that could close.
+    // Open water and soil have no stomata that could close.
     return surface.resistance_s_m;
   }
   const double night_m_s = 1.0 / std::max(surface.night_resistance_s_m, surface.resistance_s_m);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "emit/physics/gusts.hpp"
+#include "emit/physics/climate.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -6,8 +6,8 @@
 
 #include "emit/physics/air_film.hpp"
 #include "emit/physics/check.hpp"
+#include "emit/physics/climate.hpp"
 #include "emit/physics/evaporation.hpp"
-#include "emit/physics/gusts.hpp"
 
 namespace emit::physics {
 namespace {

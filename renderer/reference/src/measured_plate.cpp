@@ -9,8 +9,8 @@
 #include <cmath>
 
 #include "emit/physics/air_film.hpp"
+#include "emit/physics/climate.hpp"
 #include "emit/physics/constants.hpp"
-#include "emit/physics/gusts.hpp"
 #include "emit/reference/layer_mesh.hpp"
 #include "emit/reference/layer_solver.hpp"
 

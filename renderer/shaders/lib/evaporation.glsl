@@ -2,8 +2,8 @@
 #ifndef EMIT_LIB_EVAPORATION
 #define EMIT_LIB_EVAPORATION
 
-// Latent heat of surfaces that give water to the air (physics.md eq. 47 to 50). Twin of emit/physics/evaporation.hpp
-// and saturation.hpp.
+// Latent heat of surfaces that give water to the air (physics.md eq. 47 to 50). Twin of
+// emit/physics/evaporation.hpp.
 
 // Latent heat that leaves a surface of `t` kelvin in W/m2, and its slope in W/m2/K. `moist` holds k in W/m2/Pa where
 // water leaves and where dew forms, and the vapour pressure in Pa; a dry surface has zeros.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Judges the gusts of convection against sums by hand from published tables and formulas.
-#include "emit/physics/gusts.hpp"
+#include "emit/physics/climate.hpp"
 
 #include <gtest/gtest.h>
 

@@ -11,8 +11,8 @@
 #include <random>
 
 #include "emit/physics/air_film.hpp"
+#include "emit/physics/climate.hpp"
 #include "emit/physics/constants.hpp"
-#include "emit/physics/gusts.hpp"
 
 namespace emit::reference {
 namespace {

@@ -105,7 +105,7 @@ TEST(RendererFoster, OpenGroundFollowsTheModelInDoubleWithinTenMillikelvin) {
 TEST(RendererFoster, MoistGroundFollowsTheModelInDoubleAndIsCoolerThanDry) {
   auto scenario = foster_scenario(write_quads("plane", {ground(50.0, 50.0)}));
   const auto pose = looking({0.0, -5.0, 5.0}, {0.0, 0.0, 0.0});
-  // From the night, when stomata are closed and dew falls, to the day.
+  // The hours go from the night, when stomata are closed and dew falls, to the day.
   for (const double hours : {0.0, 3.5, 16.0}) {
     const auto now_ns = static_cast<std::int64_t>(hours * static_cast<double>(kHourNs));
     scenario.materials[0].wetness_frac = 0.0;

@@ -1,13 +1,45 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include "emit/physics/foster.hpp"
-#include "emit/physics/saturation.hpp"
+#include <cmath>
+
+#include "emit/physics/constants.hpp"
+#include "emit/physics/lanes.hpp"
 
 /// Latent heat of surfaces that give water to the air (physics.md section 8, eq. 47 to 50). Raw SI
-/// numbers. Any thread. RT-safe. shaders/lib/evaporation.glsl is the float32 twin of
-/// add_moisture().
+/// numbers. Any thread. RT-safe. shaders/lib/evaporation.glsl is the float32 twin of saturation()
+/// and add_moisture().
 namespace emit::physics {
 
+template <class Real>
+struct FosterDrive;
+
+/// Saturation pressure of water vapour and its slope.
+template <class Real>
+struct Saturation {
+  Real pressure_pa = 0;
+  Real slope_pa_k = 0;
+};
+
+/// Returns the saturation pressure over water from 273.15 K on and over ice below (physics.md eq.
+/// 48: Tetens' formula with the numbers of Murray 1967; over water it is FAO-56 eq. 11). Valid for
+/// 243 to 333 K, within 0.3 % over water and 1 % over ice. Outside 180 to 400 K it goes on along
+/// its tangent, so that it stays finite and rises.
+template <class Real>
+[[nodiscard]] Saturation<Real> saturation(const Real& temperature_k) noexcept {
+  using std::exp;
+  const Real low = Scalar<Real>(180);
+  const Real high = Scalar<Real>(400);
+  const Real floored = choose(Mask<Real>(temperature_k < low), low, temperature_k);
+  const Real held_k = choose(Mask<Real>(floored > high), high, floored);
+  const Real celsius = held_k - Real(Scalar<Real>(kZeroCelsiusK));
+  const Mask<Real> frozen = celsius < Real(0);
+  const Real a = choose(frozen, Real(Scalar<Real>(21.875)), Real(Scalar<Real>(17.27)));
+  const Real b = choose(frozen, Real(Scalar<Real>(265.5)), Real(Scalar<Real>(237.3)));
+  const Real above = celsius + b;
+  const Real pressure_pa = Real(Scalar<Real>(610.8)) * exp(a * celsius / above);
+  const Real slope_pa_k = pressure_pa * a * b / (above * above);
+  return {pressure_pa + slope_pa_k * (temperature_k - held_k), slope_pa_k};
+}
 /// Returns the saturation pressure over water at any temperature, Pa: that to which a relative
 /// humidity refers (WMO). It is the form of saturation() over water.
 [[nodiscard]] double saturation_over_water_pa(double temperature_k) noexcept;
@@ -25,7 +57,8 @@ struct MoistAir {
 /// Returns the moist air between `a` (f = 0) and `b` (f = 1), linear in f.
 [[nodiscard]] MoistAir between_airs(const MoistAir& a, const MoistAir& b, double f) noexcept;
 
-/// How a surface gives water to the air. A wetness of 0 is a dry surface.
+/// Wetness and resistances with which a surface gives water to the air. A wetness of 0 is a dry
+/// surface.
 struct MoistSurface {
   double wetness_frac = 0.0;    ///< share of the rate of a surface that is moist all over, 0..1
   double resistance_s_m = 0.0;  ///< between the water and the air at the surface, in sunlight

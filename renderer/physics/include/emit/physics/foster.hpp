@@ -9,9 +9,9 @@
 #include "emit/physics/constants.hpp"
 #include "emit/physics/equilibrium.hpp"
 #include "emit/physics/error.hpp"
+#include "emit/physics/evaporation.hpp"
 #include "emit/physics/lanes.hpp"
 #include "emit/physics/relaxation.hpp"
-#include "emit/physics/saturation.hpp"
 
 /// Heat conduction into a stack of layers, modelled by a few flux-driven states (a Foster network):
 ///

@@ -58,7 +58,7 @@ struct Forcing {
   /// different directions, and 0 if it is not known.
   double wind_to_east = 0.0;
   double wind_to_north = 0.0;
-  /// Gusts that convection adds in squares to the wind (gusts.hpp).
+  /// Gusts that convection adds in squares to the wind (climate.hpp).
   double gust_m_s = 0.0;
   double height_m = 0.0;  ///< of the place
   double cloud_frac = 0.0;

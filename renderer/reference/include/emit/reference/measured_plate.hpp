@@ -58,7 +58,7 @@ struct PlateSetup {
                                                                     std::span<const LoggerRow> rows,
                                                                     const PlateNumbers& numbers);
 
-/// Returns the flow of the air over a row: its wind with the gusts of convection (gusts.hpp).
+/// Returns the flow of the air over a row: its wind with the gusts of convection (climate.hpp).
 [[nodiscard]] physics::AirFlow air_flow(const PlateSetup& setup, const LoggerRow& row) noexcept;
 
 /// Returns the film between the air and the measured surface at every row, W m-2 K-1.
