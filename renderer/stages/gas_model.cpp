@@ -441,8 +441,8 @@ void GasModel::add_smoke(const Source<scene::SmokeDesc>& smoke, const View& view
     // A jump of the source leaves no smoke on the way.
     double length_m = glm::distance(young_m, old_m);
     if (smoke.entity) {
-      const auto at_ns = [&](double age_s) {
-        return view.sim_time_ns - static_cast<std::int64_t>(age_s * 1e9);
+      const auto at_ns = [&](double edge_s) {
+        return view.sim_time_ns - static_cast<std::int64_t>(edge_s * 1e9);
       };
       const double way_m = history.entities[*smoke.entity].path_m(at_ns(to_s), at_ns(from_s)) +
                            glm::length(drift_m_s) * (to_s - from_s);

@@ -237,7 +237,10 @@ TEST(Gas, AsWarmAsAllAroundItIsNotSeenThroughAirThatAbsorbsItsLight) {
   s.bands = {{"3-5", 3.0, 5.0, {}}};
   s.place.height_m = 0.0;
   s.atmosphere.enabled = true;
-  s.atmosphere.bands = {{.band = "3-5", .model = physics::AirSpec{}}};
+  scene::BandAtmosphere air;
+  air.band = "3-5";
+  air.model = physics::AirSpec{};
+  s.atmosphere.bands = {air};
   scene::PlumeDesc plume;
   plume.object = "plate";
   plume.radius_m = 1.0;
