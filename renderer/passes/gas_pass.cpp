@@ -95,7 +95,8 @@ Extent extent_of(const gpu::GasPuff& puff, const gpu::GasImage& image,
 
 /// Samples along the side of a pixel of an image that a puff asks for.
 std::uint32_t samples_for(const gpu::GasPuff& puff, const gpu::GasImage& image) noexcept {
-  if ((static_cast<unsigned>(puff.kind) & EMIT_GAS_SMALL) == 0) return 1;
+  const auto kind = static_cast<unsigned>(puff.kind);
+  if ((kind & EMIT_GAS_SMALL) == 0 || kind >> EMIT_GAS_SAMPLES_SHIFT != 0) return 1;
   const float sigma_px = gas_least_sigma_px(puff.covariance_px2);
   const float side_px = std::max(image.side_px.x, image.side_px.y);
   return std::clamp(static_cast<std::uint32_t>(std::ceil(kGasSampleSigmas * side_px / sigma_px)),

@@ -36,6 +36,10 @@ constexpr double kLastExhaust = 0.04;
 /// differ from the value in the middle, and the angle above which the image is no plain Gaussian.
 constexpr double kSmallSigmaPx = 4.0;
 constexpr double kSmallSigmaRad = 0.1;
+/// Optical depth of a row of puffs below which averages of the depth do for those of the light, and
+/// the samples that its image then needs, as kGasSampleSigmas.
+constexpr double kThin = 0.1;
+constexpr float kThinSampleSigmas = 0.7F;
 /// Least width of the image of a puff by its length.
 constexpr double kNarrowest = 1.0 / 200.0;
 /// Growth of smoke by its way through the air, for neutral air over open land (Briggs 1973, class
@@ -570,7 +574,6 @@ void GasModel::add(const Puff& puff, const View& view, const BandModel& bands,
       out.covariance_px2 = glm::vec3(covariance);
     }
   }
-  out.kind = static_cast<float>(kind);
   // See the puff through the air, and its optical depth by spectral term.
   const LineOpacity& opacity = line_opacity();
   const BandModel::Sight sight{
@@ -578,6 +581,7 @@ void GasModel::add(const Puff& puff, const View& view, const BandModel& bands,
       .sin_elevation = static_cast<float>(range_m > 0.0 ? from_camera_m.z / range_m : 0.0),
       .sensor_height_m = static_cast<float>(view.sensor_height_m)};
   const auto kelvin = static_cast<float>(puff.kelvin);
+  double deepest = 0.0;
   for (std::size_t b = 0; b < band_names_.size(); ++b) {
     const auto k = static_cast<glm::length_t>(b);
     const BandModel::AirWay way = bands.air_way(b, sight, kelvin);
@@ -602,8 +606,16 @@ void GasModel::add(const Puff& puff, const View& view, const BandModel& bands,
         }
       }
       out.depth[b][static_cast<glm::length_t>(t)] = static_cast<float>(depth);
+      deepest = std::max(deepest, puff.in_row * depth);
     }
   }
+  // A flare adds light, and thin gas nearly so: its mean over a pixel needs no samples of the tile.
+  if ((kind & EMIT_GAS_SMALL) != 0 && deepest < kThin) {
+    const float sigma_px = gas_least_sigma_px(out.covariance_px2);
+    const auto parts = static_cast<unsigned>(std::ceil(kThinSampleSigmas / sigma_px));
+    kind |= std::clamp(parts, 1U, kMostGasSamples) << EMIT_GAS_SAMPLES_SHIFT;
+  }
+  out.kind = static_cast<float>(kind);
 }
 
 GasModel::Seen GasModel::seen(const gpu::GasImage& image, const glm::uvec2& px, float boresight_m,
@@ -628,8 +640,14 @@ GasModel::Seen GasModel::seen(const gpu::GasImage& image, const glm::uvec2& px, 
       const auto kind = static_cast<unsigned>(puff.kind);
       float column = 0.0F;
       if ((kind & EMIT_GAS_SMALL) != 0) {
-        column =
-            physics::gas_image_column(place_px - puff.centre_px, puff.covariance_px2, side_px) *
+        const auto parts = std::max(kind >> EMIT_GAS_SAMPLES_SHIFT, 1U);
+        const glm::vec2 part_px = side_px / static_cast<float>(parts);
+        const glm::vec2 first = place_px - puff.centre_px - 0.5F * (side_px - part_px);
+        for (unsigned i = 0; i < parts * parts; ++i) {
+          column += physics::gas_image_column(first + glm::vec2(i % parts, i / parts) * part_px,
+                                              puff.covariance_px2, part_px);
+        }
+        column *= 1.0F / static_cast<float>(parts * parts) *
             physics::gas_before(puff.range_m * puff.per_along_m, surface_m * puff.per_along_m);
       } else {
         const physics::GasLine line = physics::gas_line(ray, puff.centre_m, puff.per_across_m2,

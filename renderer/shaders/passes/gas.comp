@@ -31,9 +31,16 @@ struct Gas {
 float column(int puff, vec2 px, vec3 ray, vec2 side_px, float surface_m) {
   vec4 place = texelFetch(puff_texels, puff);
   vec4 image_shape = texelFetch(puff_texels, puff + 1);
-  if ((uint(place.w) & EMIT_GAS_SMALL) != 0u) {
-    return gas_image_column(px - place.xy, image_shape.xyz, side_px) *
-           gas_before(place.z * image_shape.w, surface_m * image_shape.w);
+  uint kind = uint(place.w);
+  if ((kind & EMIT_GAS_SMALL) != 0u) {
+    int parts = int(max(kind >> EMIT_GAS_SAMPLES_SHIFT, 1u));
+    vec2 part_px = side_px / float(parts);
+    vec2 first = px - place.xy - 0.5 * (side_px - part_px);
+    float sum = 0.0;
+    for (int i = 0; i < parts * parts; ++i) {
+      sum += gas_image_column(first + vec2(i % parts, i / parts) * part_px, image_shape.xyz, part_px);
+    }
+    return sum / float(parts * parts) * gas_before(place.z * image_shape.w, surface_m * image_shape.w);
   }
   // A large puff may be near, beside or around the sensor: take its density along the line itself.
   vec4 middle = texelFetch(puff_texels, puff + 2);

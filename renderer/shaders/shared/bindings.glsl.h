@@ -87,6 +87,9 @@
 #define EMIT_GAS_DISPATCH_COLUMNS 32768u  // tiles in a row of work groups
 #define EMIT_GAS_SMALL 1u  // the image of the puff is a few pixels wide
 #define EMIT_GAS_FLARE 2u  // it emits and absorbs nothing
+// Small puffs that are thin or flares are averaged over a pixel one by one, over this many samples along its side times
+// the rest of `kind`. The other small ones take part in the samples of the tile.
+#define EMIT_GAS_SAMPLES_SHIFT 2u
 #define EMIT_GAS_FAR_M 1e7f
 
 // Boresight distance that the geometry buffer holds for a pixel without a surface.
