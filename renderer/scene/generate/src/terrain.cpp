@@ -7,6 +7,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <limits>
@@ -144,7 +145,7 @@ class Network {
     if (grid_.spacing_m * leg > kMaxTileM) return kNever;
     const std::size_t ia = index(t.a);
     const bool first_valid = valid(ia);
-    const glm::dvec3 a = points_m_[ia];
+    const glm::dvec3 a(points_m_[ia]);
     glm::dvec3 slope(0.0);
     const double middle_east_m = offset_m(t.middle().x);
     const double middle_north_m = offset_m(t.middle().y);
