@@ -109,8 +109,8 @@ Result<InfoText> ask_gdalinfo(const std::string& raster, const std::filesystem::
   const auto gdalinfo = program("gdalinfo");
   if (!gdalinfo) return tl::unexpected(gdalinfo.error());
   const auto log = work / "gdalinfo.log";
-  if (auto done = run_program({*gdalinfo, "-nomd", "-norat", "-noct", "-nogcp", gdal_name(raster)},
-                              log);
+  if (auto done =
+          run_program({*gdalinfo, "-nomd", "-norat", "-noct", "-nogcp", gdal_name(raster)}, log);
       !done) {
     return tl::unexpected(std::move(done.error()).with_context(raster));
   }
@@ -131,9 +131,10 @@ Result<RasterFacts> raster_facts(const std::string& raster, const std::filesyste
   auto info = ask_gdalinfo(raster, work);
   if (!info) return tl::unexpected(std::move(info.error()));
   if (info->bands != 1) {
-    return make_error(ErrorCode::unsupported,
-                      fmt::format("{}: the raster has {} bands; choose one with gdal_translate -b N",
-                                  raster, info->bands));
+    return make_error(
+        ErrorCode::unsupported,
+        fmt::format("{}: the raster has {} bands; choose one with gdal_translate -b N", raster,
+                    info->bands));
   }
   if (!info->has_system) {
     return make_error(
@@ -156,10 +157,10 @@ Result<RasterFacts> raster_around(const std::string& raster, double lat_deg, dou
   const auto gdalwarp = program("gdalwarp");
   if (!gdalwarp) return tl::unexpected(gdalwarp.error());
   const auto virtual_raster = work / "around.vrt";
-  if (auto done = run_program({*gdalwarp, "-q", "-overwrite", "-of", "VRT", "-t_srs",
-                               projection(lat_deg, lon_deg), gdal_name(raster),
-                               virtual_raster.string()},
-                              work / "gdalwarp.log");
+  if (auto done =
+          run_program({*gdalwarp, "-q", "-overwrite", "-of", "VRT", "-t_srs",
+                       projection(lat_deg, lon_deg), gdal_name(raster), virtual_raster.string()},
+                      work / "gdalwarp.log");
       !done) {
     return tl::unexpected(std::move(done.error()).with_context(raster));
   }
@@ -223,9 +224,9 @@ Result<std::vector<float>> warp_raster(const std::string& raster, const RasterSq
             static_cast<std::streamsize>(edge * sizeof(float)));
   }
   if (!in || in.peek() != std::ifstream::traits_type::eof()) {
-    return make_error(ErrorCode::io, fmt::format("{}: gdalwarp has written {} bytes in place of {}",
-                                                 raster, std::filesystem::file_size(file),
-                                                 values.size() * sizeof(float)));
+    return make_error(ErrorCode::io,
+                      fmt::format("{}: gdalwarp has written {} bytes in place of {}", raster,
+                                  std::filesystem::file_size(file), values.size() * sizeof(float)));
   }
   return values;
 }

@@ -12,7 +12,7 @@
 /// child processes, so that emit does not link GDAL. Setup only; one thread.
 namespace emit::tool {
 
-/// What gdalinfo says of a raster with one band.
+/// Facts that gdalinfo states of a raster with one band.
 struct RasterFacts {
   std::uint32_t columns = 0;
   std::uint32_t rows = 0;
@@ -50,7 +50,7 @@ struct RasterSquare {
                                                          double lon_deg,
                                                          const std::filesystem::path& work);
 
-/// Way to find the value of a point between the cells of a raster.
+/// Rule that gives the value of a point between the cells of a raster.
 enum class Resampling : std::uint8_t { bilinear, nearest };
 
 /// Returns the stored values at the points of a square, rows from south to north; NaN: no data.

@@ -38,8 +38,8 @@ std::string skeleton_text(const scene::SceneSummary& model,
       "epoch_utc = {}   # simulation time 0; an offset such as +02:00 may take the place of Z\n"
       "default_material = {}          # for glTF materials that nothing maps\n\n"
       "[place]\nlat_deg = {}\nlon_deg = {}\nheight_m = {}\n\n",
-      toml_quoted(options.name), options.epoch_utc, toml_quoted(options.default_material), options.lat_deg,
-      options.lon_deg, options.height_m);
+      toml_quoted(options.name), options.epoch_utc, toml_quoted(options.default_material),
+      options.lat_deg, options.lon_deg, options.height_m);
   out +=
       "[weather]                      # clear sky; file = \"weather.csv\" takes a measured table\n";
   if (options.weather) {
@@ -54,8 +54,8 @@ std::string skeleton_text(const scene::SceneSummary& model,
                        toml_quoted(options.ground_gltf), toml_quoted(options.ground_material));
   }
   // The model stands with its lowest point on the ground.
-  out +=
-      fmt::format("[[object]]\nname = {}\ngltf = {}\n", toml_quoted(options.name), toml_quoted(options.gltf));
+  out += fmt::format("[[object]]\nname = {}\ngltf = {}\n", toml_quoted(options.name),
+                     toml_quoted(options.gltf));
   if (options.scale != 1.0) {
     out += fmt::format("scale = {}                    # guessed from its size: REVIEW\n",
                        options.scale);
@@ -75,8 +75,9 @@ std::string skeleton_text(const scene::SceneSummary& model,
       out += fmt::format("{} = {}   # {}\n", toml_quoted(each.gltf_material),
                          toml_quoted(each.guess.material), share);
     } else {
-      out += fmt::format("{} = {}   # {}; guessed by '{}': REVIEW\n", toml_quoted(each.gltf_material),
-                         toml_quoted(each.guess.material), share, each.guess.word);
+      out +=
+          fmt::format("{} = {}   # {}; guessed by '{}': REVIEW\n", toml_quoted(each.gltf_material),
+                      toml_quoted(each.guess.material), share, each.guess.word);
     }
   }
   // The camera stands in front, to the left, a little above.

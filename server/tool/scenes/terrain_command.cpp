@@ -58,13 +58,12 @@ void report_heights(const TerrainCommand& command, const TerrainHeights& heights
       command.area.dem, heights.grid.cells, heights.grid.spacing_m, 1e-3 * heights.radius_m,
       heights.lat_deg, heights.lon_deg, heights.lowest_m, heights.highest_m, unit_text(heights));
   if (heights.points_no_data == 0) return;
-  const std::string share =
-      fmt::format("{} of {} points within the radius ({:.2g} %) have no data, the nearest {:.3g} km "
-                  "from the place",
-                  heights.points_no_data, heights.points,
-                  100.0 * static_cast<double>(heights.points_no_data) /
-                      static_cast<double>(heights.points),
-                  1e-3 * heights.nearest_no_data_m);
+  const std::string share = fmt::format(
+      "{} of {} points within the radius ({:.2g} %) have no data, the nearest {:.3g} km "
+      "from the place",
+      heights.points_no_data, heights.points,
+      100.0 * static_cast<double>(heights.points_no_data) / static_cast<double>(heights.points),
+      1e-3 * heights.nearest_no_data_m);
   warn(heights.points_filled > 0
            ? fmt::format("{}: they get the height {:g} m", share, *command.area.fill_m)
            : fmt::format("{}: the terrain has no ground there; --fill-m gives it a height, and "
@@ -80,8 +79,7 @@ Result<TerrainCover> cover_of(const TerrainCommand& command, const TerrainHeight
       read_cover(command.land_cover, command.classes, command.material, known, heights, work);
   if (cover && cover->points_no_class > 0) {
     warn(fmt::format("{}: {} of {} points within the radius have no class, and get '{}'",
-                     command.land_cover, cover->points_no_class, heights.points,
-                     command.material));
+                     command.land_cover, cover->points_no_class, heights.points, command.material));
   }
   return cover;
 }
@@ -128,33 +126,32 @@ Result<void> make_terrain(const TerrainCommand& command, const std::string& name
       1e-6 * static_cast<double>(written->bytes), command.error_m, command.error_mrad);
   constexpr std::uint64_t kMany = 2'000'000;
   if (terrain->triangles > kMany) {
-    warn(fmt::format("{} triangles warm up slowly; a larger --error-m or --error-mrad, or a "
-                     "smaller --radius-km, makes fewer",
-                     terrain->triangles));
+    warn(
+        fmt::format("{} triangles warm up slowly; a larger --error-m or --error-mrad, or a "
+                    "smaller --radius-km, makes fewer",
+                    terrain->triangles));
   }
 
   const std::size_t half = heights->grid.cells / 2;
   const glm::dvec3 eye_world_m = scenegen::terrain_point_m(
       heights->grid.place, 0.0, 0.0,
-      static_cast<double>(heights->grid.height_m[heights->grid.index(half, half)]) +
-          command.eye_m);
+      static_cast<double>(heights->grid.height_m[heights->grid.index(half, half)]) + command.eye_m);
   const auto file = command.out / (name + ".toml");
   auto done = write_scenario(
-      file,
-      {.name = name,
-       .gltf = gltf,
-       .source = fmt::format("Heights above the ellipsoid from {}, radius {:.4g} km.",
-                             std::filesystem::path(command.area.dem).filename().string(),
-                             1e-3 * heights->radius_m),
-       .epoch_utc = command.epoch_utc,
-       .material = command.material,
-       .lat_deg = heights->lat_deg,
-       .lon_deg = heights->lon_deg,
-       .height_m = heights->grid.place.height.value(),
-       .eye_world_m = eye_world_m,
-       .look_at_world_m = terrain_view_m(*terrain, eye_world_m, heights->radius_m),
-       .vertices = written->vertices,
-       .weather = {}});
+      file, {.name = name,
+             .gltf = gltf,
+             .source = fmt::format("Heights above the ellipsoid from {}, radius {:.4g} km.",
+                                   std::filesystem::path(command.area.dem).filename().string(),
+                                   1e-3 * heights->radius_m),
+             .epoch_utc = command.epoch_utc,
+             .material = command.material,
+             .lat_deg = heights->lat_deg,
+             .lon_deg = heights->lon_deg,
+             .height_m = heights->grid.place.height.value(),
+             .eye_world_m = eye_world_m,
+             .look_at_world_m = terrain_view_m(*terrain, eye_world_m, heights->radius_m),
+             .vertices = written->vertices,
+             .weather = {}});
   if (!done) return done;
   fmt::print("{}: `emit render {} --time-s 0 --out terrain.exr --png terrain.png` shows it\n",
              file.string(), file.string());
@@ -167,12 +164,10 @@ int run_terrain(const TerrainCommand& options) {
   std::vector<std::string> known;
   for (const scene::Material& material : material_library()) known.push_back(material.name);
   if (std::ranges::find(known, command.material) == known.end()) {
-    return fail(kExitUsage,
-                fmt::format("the library has no material '{}'", command.material));
+    return fail(kExitUsage, fmt::format("the library has no material '{}'", command.material));
   }
-  const std::string name = command.name.empty()
-                               ? std::filesystem::path(command.area.dem).stem().string()
-                               : command.name;
+  const std::string name =
+      command.name.empty() ? std::filesystem::path(command.area.dem).stem().string() : command.name;
   for (const char* extension : {".toml", ".glb"}) {
     if (auto done = check_new_file(command.out / (name + extension)); !done) {
       return fail(done.error());

@@ -101,8 +101,7 @@ Result<void> convert_heights(const TerrainArea& area, const RasterFacts& facts,
       value = std::numeric_limits<float>::quiet_NaN();
       continue;
     }
-    const double height_m =
-        unit_m * (static_cast<double>(value) * facts.scale + facts.offset);
+    const double height_m = unit_m * (static_cast<double>(value) * facts.scale + facts.offset);
     lowest_m = std::min(lowest_m, height_m);
     highest_m = std::max(highest_m, height_m);
     if (height_m < kLowestM || height_m > kHighestM) ++impossible;
@@ -111,11 +110,12 @@ Result<void> convert_heights(const TerrainArea& area, const RasterFacts& facts,
   if (impossible == 0) return {};
   return make_error(
       ErrorCode::parse,
-      fmt::format("{}: {} of {} points have heights beyond {:.0f} .. {:.0f} m, from {:.6g} to {:.6g} "
-                  "m; where a number stands for no data, --no-data names it; otherwise see "
-                  "--height-unit",
-                  area.dem, impossible, out.grid.height_m.size(), kLowestM, kHighestM, lowest_m,
-                  highest_m));
+      fmt::format(
+          "{}: {} of {} points have heights beyond {:.0f} .. {:.0f} m, from {:.6g} to {:.6g} "
+          "m; where a number stands for no data, --no-data names it; otherwise see "
+          "--height-unit",
+          area.dem, impossible, out.grid.height_m.size(), kLowestM, kHighestM, lowest_m,
+          highest_m));
 }
 
 /// Ends a radius that nobody has stated at the edge of the data. Edges of rasters in other
@@ -180,14 +180,14 @@ Result<TerrainHeights> read_heights(const TerrainArea& area, const std::filesyst
   if (cells > scenegen::kMaxTerrainCells) {
     return make_error(
         ErrorCode::invalid_argument,
-        fmt::format("{}: a radius of {:.4g} km with cells of {:.4g} m needs {:.0f} cells along an "
-                    "edge, and {} is the most; a smaller --radius-km or a larger --cell-m (at least "
-                    "{:.4g}) fits",
-                    area.dem, 1e-3 * out.radius_m, cell_m, cells, scenegen::kMaxTerrainCells,
-                    2.0 * out.radius_m / scenegen::kMaxTerrainCells));
+        fmt::format(
+            "{}: a radius of {:.4g} km with cells of {:.4g} m needs {:.0f} cells along an "
+            "edge, and {} is the most; a smaller --radius-km or a larger --cell-m (at least "
+            "{:.4g}) fits",
+            area.dem, 1e-3 * out.radius_m, cell_m, cells, scenegen::kMaxTerrainCells,
+            2.0 * out.radius_m / scenegen::kMaxTerrainCells));
   }
-  out.grid.cells =
-      std::max(2U, std::bit_ceil(static_cast<std::uint32_t>(std::ceil(cells))));
+  out.grid.cells = std::max(2U, std::bit_ceil(static_cast<std::uint32_t>(std::ceil(cells))));
   out.grid.spacing_m = 2.0 * out.radius_m / out.grid.cells;
   auto values = warp_raster(area.dem, {out.lat_deg, out.lon_deg, out.radius_m, out.grid.cells},
                             Resampling::bilinear, area.no_data, work);
@@ -252,8 +252,9 @@ Result<TerrainCover> read_cover(const std::string& raster, const std::filesystem
     return tl::unexpected(std::move(facts.error()));
   }
   const auto values =
-      warp_raster(raster, {heights.lat_deg, heights.lon_deg,
-                           0.5 * heights.grid.spacing_m * heights.grid.cells, heights.grid.cells},
+      warp_raster(raster,
+                  {heights.lat_deg, heights.lon_deg,
+                   0.5 * heights.grid.spacing_m * heights.grid.cells, heights.grid.cells},
                   Resampling::nearest, std::nullopt, work);
   if (!values) return tl::unexpected(values.error());
   const Distances distances(heights.grid);

@@ -15,11 +15,11 @@ namespace emit::tool {
 /// Which part of an elevation model is wanted, and how its numbers are to be read.
 struct TerrainArea {
   std::string dem;
-  std::optional<double> lat_deg;   ///< absent, with lon_deg: the middle of the raster
+  std::optional<double> lat_deg;  ///< absent, with lon_deg: the middle of the raster
   std::optional<double> lon_deg;
-  std::optional<double> height_m;  ///< of the world origin; absent: the ground there
-  std::optional<double> radius_m;  ///< absent: what the raster holds
-  std::optional<double> cell_m;    ///< absent: that of the raster
+  std::optional<double> height_m;    ///< of the world origin; absent: the ground there
+  std::optional<double> radius_m;    ///< absent: what the raster holds
+  std::optional<double> cell_m;      ///< absent: that of the raster
   std::string height_unit = "auto";  ///< auto, m, ft or us-ft
   std::optional<double> no_data;     ///< stored number that stands for no data
   std::optional<double> fill_m;      ///< height of points without data
@@ -31,14 +31,14 @@ struct TerrainHeights {
   double lat_deg = 0.0;
   double lon_deg = 0.0;
   double radius_m = 0.0;
-  double lowest_m = 0.0;   ///< within the radius
+  double lowest_m = 0.0;  ///< within the radius
   double highest_m = 0.0;
-  std::string unit;                 ///< "m", "ft" or "us-ft"
-  bool unit_stated = false;         ///< by the file or the user
-  std::size_t points = 0;           ///< within the radius
-  std::size_t points_no_data = 0;   ///< of them
-  std::size_t points_filled = 0;    ///< of them
-  double nearest_no_data_m = 0.0;   ///< distance from the place; 0: there is none
+  std::string unit;                ///< "m", "ft" or "us-ft"
+  bool unit_stated = false;        ///< by the file or the user
+  std::size_t points = 0;          ///< within the radius
+  std::size_t points_no_data = 0;  ///< of them
+  std::size_t points_filled = 0;   ///< of them
+  double nearest_no_data_m = 0.0;  ///< distance from the place; 0: there is none
 };
 
 /// Reads heights by GDAL. Errors: those of gdal_raster.hpp; invalid_argument (the place lies

@@ -68,7 +68,8 @@ std::string terrain_scenario_text(const TerrainScenario& scenario) {
       "spacing = \"geometric\"\n"
       "first_step_s = 60.0\n"
       "lateral = false                # heat does not flow sideways over facets of tens of metres\n"
-      "exchange = false               # slopes see the surroundings' temperature below their sky\n\n",
+      "exchange = false               # slopes see the surroundings' temperature below their "
+      "sky\n\n",
       samples);
   out += fmt::format("[[object]]\nname = \"terrain\"\ngltf = {}\n\n", toml_quoted(scenario.gltf));
   out += fmt::format(

@@ -10,13 +10,13 @@
 
 namespace emit::tool {
 
-/// What the scenario of a terrain says beside its geometry.
+/// Values of the scenario of a terrain.
 struct TerrainScenario {
   std::string name;
-  std::string gltf;         ///< as the file names it
-  std::string source;       ///< one line on the heights, for a comment
+  std::string gltf;    ///< as the file names it
+  std::string source;  ///< one line on the heights, for a comment
   std::string epoch_utc;
-  std::string material;     ///< of the surroundings
+  std::string material;  ///< of the surroundings
   double lat_deg = 0.0;
   double lon_deg = 0.0;
   double height_m = 0.0;

@@ -106,9 +106,9 @@ TEST(Geodesy, ThePlaneOfTheHorizonIsTheOrthographicProjectionOfProj) {
   const HorizonPlane plane({degrees(48.015), degrees(11.015), Metres(123.0)});
   const auto point = plane.ellipsoid_point(Metres(35982.531170232), Metres(31803.1874481195));
   ASSERT_TRUE(point);
-  EXPECT_LT(glm::distance(point->position_ecef_m,
-                          ecef_m({degrees(48.3), degrees(11.5), Metres(0.0)})),
-            1e-6);
+  EXPECT_LT(
+      glm::distance(point->position_ecef_m, ecef_m({degrees(48.3), degrees(11.5), Metres(0.0)})),
+      1e-6);
 }
 
 TEST(Geodesy, PointsOfTheHorizonsPlaneComeBackWithTheirNormals) {

@@ -44,8 +44,7 @@ HeightGrid grid_of(std::uint32_t cells, double spacing_m, const HeightField& hei
     }
   }
   const auto middle = static_cast<double>(grid.height_m[grid.index(cells / 2, cells / 2)]);
-  grid.place = {degrees(kLatitudeDeg), degrees(11.0),
-                Metres(std::isfinite(middle) ? middle : 0.0)};
+  grid.place = {degrees(kLatitudeDeg), degrees(11.0), Metres(std::isfinite(middle) ? middle : 0.0)};
   return grid;
 }
 
@@ -89,8 +88,7 @@ TEST(Terrain, vertical_errors_are_within_the_bound_at_every_point_of_the_grid) {
     const glm::dvec3 lo = glm::min(t[0], glm::min(t[1], t[2]));
     const glm::dvec3 hi = glm::max(t[0], glm::max(t[1], t[2]));
     const auto first = [&](double at_m) {
-      return static_cast<std::size_t>(
-          std::clamp(at_m / grid.spacing_m + 128.0 - 2.0, 0.0, 256.0));
+      return static_cast<std::size_t>(std::clamp(at_m / grid.spacing_m + 128.0 - 2.0, 0.0, 256.0));
     };
     for (std::size_t y = first(lo.y); y <= std::min<std::size_t>(256, first(hi.y) + 4); ++y) {
       for (std::size_t x = first(lo.x); x <= std::min<std::size_t>(256, first(hi.x) + 4); ++x) {
@@ -206,8 +204,8 @@ TEST(Terrain, a_mountain_behind_the_horizon_shows_what_curvature_does_not_hide) 
     for (const auto& [distance_m, up_m] : points) {
       peak_rad = std::max(peak_rad, std::atan2(up_m, distance_m));
     }
-    EXPECT_NEAR(peak_rad,
-                std::atan((kPeakM - eye_m - away_m * away_m / (2.0 * radius_m)) / away_m), 1e-4);
+    EXPECT_NEAR(peak_rad, std::atan((kPeakM - eye_m - away_m * away_m / (2.0 * radius_m)) / away_m),
+                1e-4);
     // The line of sight that touches the sea meets the flank where its height is the hidden one.
     const double dip_rad = std::sqrt(2.0 * eye_m / radius_m);
     const double horizon_m = std::sqrt(2.0 * eye_m * radius_m);
@@ -218,8 +216,8 @@ TEST(Terrain, a_mountain_behind_the_horizon_shows_what_curvature_does_not_hide) 
       const double before = points[i - 1].second + dip_rad * points[i - 1].first;
       const double after = points[i].second + dip_rad * points[i].first;
       if (before > 0.0 || after <= 0.0) continue;
-      const double at_m = points[i - 1].first +
-                          (points[i].first - points[i - 1].first) * before / (before - after);
+      const double at_m =
+          points[i - 1].first + (points[i].first - points[i - 1].first) * before / (before - after);
       hidden_m = std::pow(at_m - horizon_m, 2) / (2.0 * radius_m);
       lowest_seen_m = kPeakM * (1.0 - (away_m - at_m) / kFootM);
     }
@@ -289,9 +287,8 @@ std::filesystem::path scratch_file(const std::string& name) {
 
 TEST(Terrain, edges_are_shared_within_and_across_tiles_to_the_bit) {
   const HeightGrid grid = grid_of(512, 80.0, rough_m);
-  const auto terrain =
-      triangulate_terrain(grid, {}, {.radius_m = 1e5, .error_m = 2.0, .error_rad = 1e-3,
-                                     .max_tile_triangles = 5000});
+  const auto terrain = triangulate_terrain(
+      grid, {}, {.radius_m = 1e5, .error_m = 2.0, .error_rad = 1e-3, .max_tile_triangles = 5000});
   ASSERT_TRUE(terrain) << terrain.error().text;
   EXPECT_GT(terrain->tiles.size(), 20U);
   const std::vector<std::string> names{"soil"};
@@ -303,7 +300,8 @@ TEST(Terrain, edges_are_shared_within_and_across_tiles_to_the_bit) {
   EXPECT_EQ(triangles.size(), terrain->triangles);
   std::set<Point> rim;
   for (std::size_t i = 0; i <= 512; ++i) {
-    for (const auto& [x, y] : {std::pair<std::size_t, std::size_t>{i, 0}, {i, 512}, {0, i}, {512, i}}) {
+    for (const auto& [x, y] :
+         {std::pair<std::size_t, std::size_t>{i, 0}, {i, 512}, {0, i}, {512, i}}) {
       rim.insert(rounded_point(grid, x, y));
     }
   }
@@ -343,13 +341,12 @@ TEST(Terrain, tiles_have_at_most_the_wanted_triangles_and_float32_holds_them) {
 TEST(Terrain, ground_ends_at_points_without_data_and_at_the_radius) {
   constexpr double kHoleM = 1000.0;
   const auto hole_m = [](double east_m, double north_m) {
-    return std::hypot(east_m - 3000.0, north_m) < kHoleM
-               ? std::numeric_limits<double>::quiet_NaN()
-               : 10.0;
+    return std::hypot(east_m - 3000.0, north_m) < kHoleM ? std::numeric_limits<double>::quiet_NaN()
+                                                         : 10.0;
   };
   const HeightGrid grid = grid_of(256, 100.0, hole_m);
-  const auto terrain = triangulate_terrain(
-      grid, {}, {.radius_m = 8000.0, .error_m = 1.0, .error_rad = 1e-3});
+  const auto terrain =
+      triangulate_terrain(grid, {}, {.radius_m = 8000.0, .error_m = 1.0, .error_rad = 1e-3});
   ASSERT_TRUE(terrain) << terrain.error().text;
   double plan_m2 = 0.0;
   for (const Corners& t : triangles_of(*terrain)) {
@@ -371,8 +368,7 @@ TEST(Terrain, materials_meet_where_the_cells_do) {
       material[grid.index(x, y)] = grid.offset_m(x) < 777.0 ? 0 : 1;
     }
   }
-  const auto terrain =
-      triangulate_terrain(grid, material, {.radius_m = 1e5, .cover_rad = 0.0});
+  const auto terrain = triangulate_terrain(grid, material, {.radius_m = 1e5, .cover_rad = 0.0});
   ASSERT_TRUE(terrain) << terrain.error().text;
   std::size_t seen = 0;
   for (const TerrainTile& tile : terrain->tiles) {
@@ -393,8 +389,7 @@ TEST(Terrain, materials_meet_where_the_cells_do) {
   }
   EXPECT_EQ(seen, terrain->triangles);
   // Wide borders cost fewer triangles.
-  const auto coarse =
-      triangulate_terrain(grid, material, {.radius_m = 1e5, .cover_rad = 0.5});
+  const auto coarse = triangulate_terrain(grid, material, {.radius_m = 1e5, .cover_rad = 0.5});
   ASSERT_TRUE(coarse);
   EXPECT_LT(coarse->triangles, terrain->triangles / 2);
 }

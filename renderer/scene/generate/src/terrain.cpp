@@ -40,15 +40,12 @@ class WorldPoints {
         world_from_ecef_(glm::transpose(physics::ecef_from_enu(place))) {}
 
   [[nodiscard]] glm::dvec3 point_m(double east_m, double north_m, double height_m) const {
-    const auto foot =
-        plane_.ellipsoid_point(physics::Metres(east_m), physics::Metres(north_m));
+    const auto foot = plane_.ellipsoid_point(physics::Metres(east_m), physics::Metres(north_m));
     EMIT_CHECK(foot.has_value());
-    return world_from_ecef_ *
-           (foot->position_ecef_m + height_m * foot->up_ecef - origin_ecef_m_);
+    return world_from_ecef_ * (foot->position_ecef_m + height_m * foot->up_ecef - origin_ecef_m_);
   }
   [[nodiscard]] glm::dvec3 up(double east_m, double north_m) const {
-    const auto foot =
-        plane_.ellipsoid_point(physics::Metres(east_m), physics::Metres(north_m));
+    const auto foot = plane_.ellipsoid_point(physics::Metres(east_m), physics::Metres(north_m));
     EMIT_CHECK(foot.has_value());
     return world_from_ecef_ * foot->up_ecef;
   }
@@ -179,8 +176,8 @@ class Network {
         mixed = mixed || (!material_.empty() && material_[i] != first_material);
         const double error_m = std::abs(glm::dot(slope, glm::dvec3(points_m_[i]) - a));
         const double east_m = offset_m(x);
-        worst = std::max(
-            worst, error_m / allowed_m(std::sqrt(east_m * east_m + north_m * north_m)));
+        worst =
+            std::max(worst, error_m / allowed_m(std::sqrt(east_m * east_m + north_m * north_m)));
       }
       if (worst > 1.0) break;
     }
@@ -319,8 +316,8 @@ class Tiler {
 
   void cut(std::span<Triangle> triangles, Node corner, int edge, std::vector<TerrainTile>& out) {
     if (triangles.empty()) return;
-    if (edge > 1 && (triangles.size() > options_.max_tile_triangles ||
-                     grid_.spacing_m * edge > kMaxTileM)) {
+    if (edge > 1 &&
+        (triangles.size() > options_.max_tile_triangles || grid_.spacing_m * edge > kMaxTileM)) {
       // Three times the middle of a triangle is a whole number.
       const int half = edge / 2;
       const auto north = std::partition(triangles.begin(), triangles.end(), [&](const Triangle& t) {
@@ -363,13 +360,14 @@ class Tiler {
       const std::uint8_t material = material_of(t);
       auto part = std::ranges::find(out.parts, std::uint32_t{material}, &TerrainPart::material);
       if (part == out.parts.end()) {
-        out.parts.push_back({.material = material, .positions_m = {}, .normals = {}, .indices = {}});
+        out.parts.push_back(
+            {.material = material, .positions_m = {}, .normals = {}, .indices = {}});
         part = out.parts.end() - 1;
       }
       for (const Node node : {t.a, t.b, t.c}) {
         const std::uint32_t vertex = vertices_.number(node);
-        const auto [found, is_new] = known.try_emplace(std::uint64_t{material} << 32U | vertex,
-                                                       part->positions_m.size());
+        const auto [found, is_new] =
+            known.try_emplace(std::uint64_t{material} << 32U | vertex, part->positions_m.size());
         if (is_new) {
           part->positions_m.emplace_back(vertices_.position_m(vertex) - out.origin_world_m);
           part->normals.emplace_back(vertices_.normal(vertex));
@@ -396,8 +394,9 @@ Result<void> check(const HeightGrid& grid, std::span<const std::uint8_t> materia
   };
   const std::size_t points = grid.points() * grid.points();
   for (const Result<void>& done :
-       {require(grid.cells >= 2 && grid.cells <= kMaxTerrainCells && std::has_single_bit(grid.cells),
-                "cells", grid.cells, "must be a power of two in 2 .. 8192"),
+       {require(
+            grid.cells >= 2 && grid.cells <= kMaxTerrainCells && std::has_single_bit(grid.cells),
+            "cells", grid.cells, "must be a power of two in 2 .. 8192"),
         require(grid.spacing_m >= 0.01 && grid.spacing_m <= 1e4, "spacing_m", grid.spacing_m,
                 "must be in 0.01 .. 10000"),
         require(grid.height_m.size() == points, "height_m.size()",
@@ -449,8 +448,8 @@ Result<GeneratedFile> write_terrain(const std::filesystem::path& file, const Ter
     mesh.name = fmt::format("tile_{}", scene.meshes.size());
     for (const TerrainPart& part : tile.parts) {
       EMIT_CHECK_OP(part.material, <, material_names.size());
-      mesh.parts.push_back({material_names[part.material], false, part.positions_m, part.normals,
-                            part.indices});
+      mesh.parts.push_back(
+          {material_names[part.material], false, part.positions_m, part.normals, part.indices});
     }
     const std::string name = mesh.name;
     scene.place(scene.add_mesh(std::move(mesh)), name, tile.origin_world_m);

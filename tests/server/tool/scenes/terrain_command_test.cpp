@@ -113,13 +113,13 @@ TEST(CliTerrain, vertices_lie_where_the_raster_has_their_height) {
       const std::string out = folder.file(fmt::format("o{}{}", projected, by_latitude));
       if (projected) {
         const std::string utm = file + ".utm.tif";
-        run_gdal({"gdalwarp", "-q", "-r", "bilinear", "-t_srs", "EPSG:32632", "-dstnodata",
-                  "-9999", file, utm});
+        run_gdal({"gdalwarp", "-q", "-r", "bilinear", "-t_srs", "EPSG:32632", "-dstnodata", "-9999",
+                  file, utm});
         file = utm;
       }
-      const ProcessResult made = run_emit({"scene", "terrain", file, "--name", "t", "--out", out,
-                                           "--radius-km", "3", "--error-m", "0.02",
-                                           "--error-mrad", "0"});
+      const ProcessResult made =
+          run_emit({"scene", "terrain", file, "--name", "t", "--out", out, "--radius-km", "3",
+                    "--error-m", "0.02", "--error-mrad", "0"});
       ASSERT_EQ(made.exit_code, 0) << made.out << made.err;
       EXPECT_NE(made.out.find("because the raster states no unit"), std::string::npos) << made.out;
       const auto places = places_of(out + "/t.glb", origin_of(out + "/t.toml"));
@@ -152,9 +152,9 @@ TEST(CliTerrain, the_place_and_its_ground_are_the_origin_of_the_world) {
   ASSERT_NE(at, std::string::npos) << made.out;
   EXPECT_NEAR(std::atof(made.out.c_str() + at + 7), 3.04, 0.05) << made.out;
   EXPECT_TRUE(made.err.empty()) << made.err;
-  EXPECT_EQ(run_emit({"scene", "terrain", folder.file("d.tif"), "--out", folder.file("o")})
-                .exit_code,
-            1);  // it is not written over
+  EXPECT_EQ(
+      run_emit({"scene", "terrain", folder.file("d.tif"), "--out", folder.file("o")}).exit_code,
+      1);  // it is not written over
 }
 
 TEST(CliTerrain, feet_become_metres) {
@@ -257,9 +257,15 @@ TEST(CliTerrain, land_cover_chooses_materials_and_unknown_classes_are_counted) {
   });
   write_text(folder.file("c.csv"), "class,material\n3,grass\n5,sand\n");
   const auto run = [&](const std::string& out, std::vector<std::string> more) {
-    std::vector<std::string> call{"scene", "terrain", folder.file("d.tif"), "--out",
-                                  folder.file(out), "--land-cover", folder.file("c.tif"),
-                                  "--classes", folder.file("c.csv")};
+    std::vector<std::string> call{"scene",
+                                  "terrain",
+                                  folder.file("d.tif"),
+                                  "--out",
+                                  folder.file(out),
+                                  "--land-cover",
+                                  folder.file("c.tif"),
+                                  "--classes",
+                                  folder.file("c.csv")};
     call.insert(call.end(), more.begin(), more.end());
     return run_emit(call);
   };
@@ -288,8 +294,8 @@ TEST(CliTerrain, land_cover_chooses_materials_and_unknown_classes_are_counted) {
 TEST(CliTerrain, the_rendered_horizon_dips_by_the_curvature_of_the_earth) {
   NEEDS_GDAL();
   const TemporaryFolder folder;
-  write_raster(folder.file("sea.tif"), {.columns = 141, .rows = 101, .west = 10.0, .south = 46.5,
-                                        .cell = 0.01},
+  write_raster(folder.file("sea.tif"),
+               {.columns = 141, .rows = 101, .west = 10.0, .south = 46.5, .cell = 0.01},
                [](double, double) { return 0.0; });
   ASSERT_EQ(run_emit({"scene", "terrain", folder.file("sea.tif"), "--out", folder.file("o"),
                       "--error-m", "0.2", "--error-mrad", "0.02"})
@@ -298,12 +304,11 @@ TEST(CliTerrain, the_rendered_horizon_dips_by_the_curvature_of_the_earth) {
   constexpr double kFovDeg = 0.2;
   constexpr double kWidthPx = 32.0;
   constexpr double kEyeM = 100.0;
-  const ProcessResult rendered =
-      run_emit({"render", folder.file("o/sea.toml"), "--quality", "preview", "--time-s", "0",
-                "--out", folder.file("f.exr"), "--set", "sensor.fov_h_deg=0.2", "--set",
-                "sensor.width_px=32", "--set", "sensor.height_px=512", "--set",
-                "sensor.look_at_m=[0,1000,100]"},
-               std::chrono::seconds(300));
+  const ProcessResult rendered = run_emit(
+      {"render", folder.file("o/sea.toml"), "--quality", "preview", "--time-s", "0", "--out",
+       folder.file("f.exr"), "--set", "sensor.fov_h_deg=0.2", "--set", "sensor.width_px=32",
+       "--set", "sensor.height_px=512", "--set", "sensor.look_at_m=[0,1000,100]"},
+      std::chrono::seconds(300));
   ASSERT_EQ(rendered.exit_code, 0) << rendered.err;
   const auto image = image::read_exr(folder.file("f.exr"));
   ASSERT_TRUE(image) << image.error().text;
@@ -327,10 +332,9 @@ TEST(CliTerrain, the_rendered_horizon_dips_by_the_curvature_of_the_earth) {
 
 TEST(CliTerrain, a_missing_gdal_is_named_with_its_package) {
   const TemporaryFolder folder;
-  const ProcessResult result =
-      run_process({"/usr/bin/env", "PATH=" + folder.path().string(),
-                   std::string(EMIT_TEST_BIN_DIR) + "/emit", "scene", "terrain", "d.tif", "--out",
-                   folder.file("o")});
+  const ProcessResult result = run_process({"/usr/bin/env", "PATH=" + folder.path().string(),
+                                            std::string(EMIT_TEST_BIN_DIR) + "/emit", "scene",
+                                            "terrain", "d.tif", "--out", folder.file("o")});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_NE(result.err.find("apt-get install gdal-bin"), std::string::npos) << result.err;
 }

@@ -40,7 +40,7 @@ struct HeightGrid {
   }
 };
 
-/// What the triangles must keep to. d is the horizontal distance of a point from the place.
+/// Limits of the triangles. In these, d is the horizontal distance of a point from the place.
 struct TerrainOptions {
   double radius_m = 0.0;    ///< > 0; no triangle lies wholly beyond it
   double error_m = 0.5;     ///< 0.01 .. 1000; the vertical error is at most max(error_m, ...
