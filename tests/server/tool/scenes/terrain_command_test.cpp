@@ -46,7 +46,7 @@ struct Raster {
   double south = 47.0;
   double cell = 0.001;
   std::string system = "EPSG:4326";
-  std::vector<std::string> more;  ///< options of gdal_translate
+  std::vector<std::string> more = {};  ///< options of gdal_translate
 };
 
 /// Writes a GeoTIFF of floats. `value` gets the middle of each cell.
