@@ -13,9 +13,11 @@ namespace emit::tool {
 glm::dvec3 terrain_view_m(const scenegen::Terrain& terrain, const glm::dvec3& eye_world_m,
                           double radius_m) {
   constexpr double kNearFrac = 0.1;
-  constexpr double kFlatRad = 0.005;
-  double best = kFlatRad;
-  glm::dvec3 target = eye_world_m + glm::dvec3(0.0, 0.5 * radius_m, -0.02 * radius_m);
+  constexpr double kFlat = 0.005;
+  // The axis looks this far below the peak or the horizon, so that most of the picture is ground.
+  constexpr double kBelow = 0.12;
+  double best = kFlat;
+  glm::dvec3 target = eye_world_m + 0.5 * radius_m * glm::dvec3(0.0, 1.0, -kBelow);
   for (const scenegen::TerrainTile& tile : terrain.tiles) {
     for (const scenegen::TerrainPart& part : tile.parts) {
       for (const glm::vec3& position_m : part.positions_m) {
@@ -25,7 +27,7 @@ glm::dvec3 terrain_view_m(const scenegen::Terrain& terrain, const glm::dvec3& ey
         if (distance_m < kNearFrac * radius_m || distance_m > radius_m) continue;
         if (to_point_m.z <= best * distance_m) continue;
         best = to_point_m.z / distance_m;
-        target = point_m;
+        target = point_m - glm::dvec3(0.0, 0.0, kBelow * distance_m);
       }
     }
   }
@@ -67,10 +69,16 @@ std::string terrain_scenario_text(const TerrainScenario& scenario) {
       "steps = 24\n"
       "spacing = \"geometric\"\n"
       "first_step_s = 60.0\n"
-      "lateral = false                # heat does not flow sideways over facets of tens of metres\n"
-      "exchange = false               # slopes see the surroundings' temperature below their "
-      "sky\n\n",
+      "lateral = false                # heat does not flow sideways over facets of tens of "
+      "metres\n\n",
       samples);
+  if (scenario.weather) {
+    constexpr double kColderK = 20.0;
+    constexpr double kWarmerK = 25.0;
+    out += fmt::format("[display]\nmin_k = {:.0f}\nmax_k = {:.0f}\n\n",
+                       scenario.weather->air_mean_k - kColderK,
+                       scenario.weather->air_mean_k + kWarmerK);
+  }
   out += fmt::format("[[object]]\nname = \"terrain\"\ngltf = {}\n\n", toml_quoted(scenario.gltf));
   out += fmt::format(
       "[sensor]\nwidth_px = 640\nheight_px = 512\nfov_h_deg = 40.0\nnear_m = 1.0\n"

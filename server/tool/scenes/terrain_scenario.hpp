@@ -26,8 +26,9 @@ struct TerrainScenario {
   std::optional<SkeletonWeather> weather;  ///< none: the climate of the place
 };
 
-/// Returns the point that a camera at `eye_world_m` looks at: the vertex with the highest elevation
-/// angle that is not near, or a point in the north where the ground is flat.
+/// Returns the point that a camera at `eye_world_m` looks at, so that the vertex with the highest
+/// elevation angle that is not near is in the upper half of its picture. Where the ground is flat,
+/// the horizon in the north is.
 [[nodiscard]] glm::dvec3 terrain_view_m(const scenegen::Terrain& terrain,
                                         const glm::dvec3& eye_world_m, double radius_m);
 
