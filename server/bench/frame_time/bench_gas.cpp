@@ -85,11 +85,14 @@ Result<std::vector<Row>> measure(const GasOptions& command, std::string& device)
     const auto& [bare_ms, twin_ms, with_ms] = *rounds;
     device = runners[0].device();
     if (rows.empty()) {
-      Row& row = rows.emplace_back(Row{.gas = "none"});
+      Row& row = rows.emplace_back();
+      row.gas = "none";
       for (const double ms : bare_ms) row.frame_ms.add(ms);
       row.pairs = {.pairs = bare_ms.size(), .ratio = 1.0, .self_ratio = 1.0};
     }
-    Row& row = rows.emplace_back(Row{.gas = kind.name, .puffs = with.gas.puffs()});
+    Row& row = rows.emplace_back();
+    row.gas = kind.name;
+    row.puffs = with.gas.puffs();
     for (const double ms : with_ms) row.frame_ms.add(ms);
     row.pairs = paired_ratio(bare_ms, twin_ms, with_ms);
   }
@@ -141,11 +144,12 @@ void add_options(CommandLine& line, GasOptions& options) {
 }  // namespace
 
 void add_bench_gas(CommandLine& bench) {
-  bench.command<GasOptions>({.name = "gas",
-                             .text = "What plumes, flares, smoke and fires of a scenario add to the "
-                                     "frame time, each kind alone and all together",
-                             .example = "emit bench gas --json gas.json"},
-                            add_options, run);
+  bench.command<GasOptions>(
+      {.name = "gas",
+       .text = "What plumes, flares, smoke and fires of a scenario add to the "
+               "frame time, each kind alone and all together",
+       .example = "emit bench gas --json gas.json"},
+      add_options, run);
 }
 
 }  // namespace emit::tool
