@@ -59,6 +59,14 @@ TEST(Tutorials, OwnScene) {
   run_shell_snippets("own_scene.md");
 }
 
+TEST(Tutorials, Terrain) {
+  const ScratchFolder folder;
+  if (run(folder, "command -v gdalwarp gdal_translate") != 0) {
+    GTEST_SKIP() << "GDAL's programs (Debian gdal-bin) are not installed";
+  }
+  run_shell_snippets("terrain.md");
+}
+
 TEST(Tutorials, Rig) {
   run_shell_snippets("rig.md");
 }

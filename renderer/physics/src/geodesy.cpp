@@ -2,6 +2,7 @@
 #include "emit/physics/geodesy.hpp"
 
 #include <cmath>
+#include <glm/geometric.hpp>
 
 #include "emit/physics/constants.hpp"
 
@@ -59,6 +60,30 @@ glm::dmat3 ecef_from_enu(const GeoPlace& place) noexcept {
   const double clon = std::cos(place.longitude.value());
   return {glm::dvec3(-slon, clon, 0.0), glm::dvec3(-slat * clon, -slat * slon, clat),
           glm::dvec3(clat * clon, clat * slon, slat)};
+}
+
+HorizonPlane::HorizonPlane(const GeoPlace& place) noexcept
+    : ecef_from_enu_(ecef_from_enu(place)),
+      origin_ecef_m_(ecef_m({place.latitude, place.longitude, Metres(0.0)})) {}
+
+std::optional<EllipsoidPoint> HorizonPlane::ellipsoid_point(Metres east,
+                                                            Metres north) const noexcept {
+  constexpr glm::dvec3 kInverseAxes2(1.0 / (kWgs84SemiMajorM * kWgs84SemiMajorM),
+                                     1.0 / (kWgs84SemiMajorM * kWgs84SemiMajorM),
+                                     1.0 / (kSemiMinorM * kSemiMinorM));
+  const glm::dvec3 offset = ecef_from_enu_[0] * east.value() + ecef_from_enu_[1] * north.value();
+  const glm::dvec3& up = ecef_from_enu_[2];
+  // The vertical line origin + offset + u up meets the ellipsoid where a u^2 + 2 b u + c = 0. The
+  // origin lies on the ellipsoid, and its normal is up, which leaves only the square of the offset
+  // in c: no large numbers cancel.
+  const double a = glm::dot(up, kInverseAxes2 * up);
+  const double b = glm::dot(up, kInverseAxes2 * (origin_ecef_m_ + offset));
+  const double c = glm::dot(offset, kInverseAxes2 * offset);
+  const double root2 = b * b - a * c;
+  if (!(root2 >= 0.0)) return std::nullopt;
+  const double u_m = -c / (b + std::sqrt(root2));
+  const glm::dvec3 position = origin_ecef_m_ + offset + u_m * up;
+  return EllipsoidPoint{position, glm::normalize(kInverseAxes2 * position)};
 }
 
 }  // namespace emit::physics

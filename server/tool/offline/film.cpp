@@ -3,14 +3,10 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
 #include <cstdlib>
-#include <fstream>
-#include <iterator>
 #include <system_error>
 #include <vector>
 
-#include "tool/support/interrupt.hpp"
 #include "tool/support/output_check.hpp"
 #include "tool/support/subprocess.hpp"
 
@@ -68,18 +64,8 @@ Result<void> Film::finish() {
                                       "-movflags", "+faststart"};
   call.insert(call.end(), coding.begin(), coding.end());
   call.push_back(made.string());
-  const auto log = folder_.path() / "ffmpeg.log";
-  auto process = Subprocess::start(call, log);
-  if (!process) return tl::unexpected(process.error());
-  std::optional<int> status;
-  while (!(status = process->wait(std::chrono::milliseconds(200)))) {
-    if (InterruptGuard::interrupted()) return make_error(ErrorCode::internal, "interrupted");
-  }
-  if (*status != 0) {
-    std::ifstream text(log);
-    const std::string said{std::istreambuf_iterator<char>(text), std::istreambuf_iterator<char>()};
-    return make_error(ErrorCode::io, fmt::format("{}: ffmpeg ended with exit code {}: {}",
-                                                 file_.string(), *status, said));
+  if (auto done = run_program(call, folder_.path() / "ffmpeg.log"); !done) {
+    return tl::unexpected(std::move(done.error()).with_context(file_.string()));
   }
   std::error_code error;
   std::filesystem::rename(made, file_, error);

@@ -18,13 +18,14 @@
 #include "tool/offline/preview.hpp"
 #include "tool/offline/time_options.hpp"
 #include "tool/scenes/preview_sheet.hpp"
+#include "tool/scenes/scenario_file.hpp"
 #include "tool/scenes/scene_check.hpp"
 #include "tool/scenes/scene_skeleton.hpp"
+#include "tool/scenes/terrain_command.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/frame_files.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
-#include "tool/support/replacing_file.hpp"
 #include "tool/support/scenario_input.hpp"
 
 namespace emit::tool {
@@ -58,13 +59,6 @@ struct PreviewOptions {
   std::uint32_t height_px = 256;
   int gpu_index = -1;
 };
-
-Result<void> write_text(const std::filesystem::path& path, const std::string& text) {
-  auto file = ReplacingFile::create(path);
-  if (!file) return tl::unexpected(std::move(file.error()));
-  if (auto done = file->write(text); !done) return done;
-  return file->commit();
-}
 
 /// Name of a file as a scenario in `folder` gives it: relative where it lies in the folder.
 std::string name_from(const std::filesystem::path& folder, const std::filesystem::path& file) {
@@ -117,11 +111,7 @@ int run_new(const NewOptions& command) {
   if (skeleton.name.empty()) skeleton.name = command.model.stem().string();
   skeleton.gltf = name_from(command.out, command.model);
   const auto file = command.out / (skeleton.name + ".toml");
-  std::error_code ignored;
-  if (std::filesystem::exists(file, ignored)) {
-    return fail(kExitFailure,
-                fmt::format("{}: exists already, and is not written over", file.string()));
-  }
+  if (auto done = check_new_file(file); !done) return fail(done.error());
   if (auto made = make_directory(command.out); !made) return fail(made.error());
   const scene::Aabb& box = model->bounds_body;
   const double largest_m =
@@ -133,7 +123,7 @@ int run_new(const NewOptions& command) {
   const std::vector<SkeletonMaterial> materials = skeleton_materials(*model, library);
   // Write the file, load it, and write it again with the air that place and date give.
   for (int round = 0; round < 2; ++round) {
-    if (auto done = write_text(file, skeleton_text(*model, materials, skeleton)); !done) {
+    if (auto done = write_text_file(file, skeleton_text(*model, materials, skeleton)); !done) {
       return fail(done.error());
     }
     const auto scenario = config::load_scenario(file);
@@ -311,7 +301,8 @@ void add_preview_options(CommandLine& line, PreviewOptions& options) {
 
 void add_scene(CommandLine& tool) {
   CommandLine scene = tool.group({.name = "scene",
-                                  .text = "Make, check and preview scenes from glTF models",
+                                  .text = "Make, check and preview scenes from glTF models and "
+                                          "elevation models",
                                   .example = "emit scene new truck.glb --out truck"});
   scene.command<NewOptions>(
       {.name = "new",
@@ -328,6 +319,7 @@ void add_scene(CommandLine& tool) {
                                  .text = "Render a sheet of four views, two bands and three times",
                                  .example = "emit scene preview truck/truck.toml --out sheet.png"},
                                 add_preview_options, run_preview);
+  add_terrain(scene);
 }
 
 }  // namespace emit::tool

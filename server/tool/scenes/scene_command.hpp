@@ -4,8 +4,8 @@
 
 namespace emit::tool {
 
-/// Registers the commands `scene new`, `scene check` and `scene preview`, as the functions of
-/// tool/commands/commands.hpp do theirs.
+/// Registers the commands `scene new`, `scene check`, `scene preview` and `scene terrain`, as the
+/// functions of tool/commands/commands.hpp do theirs.
 void add_scene(CommandLine& tool);
 
 }  // namespace emit::tool

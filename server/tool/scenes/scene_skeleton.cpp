@@ -7,27 +7,9 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "tool/scenes/scenario_file.hpp"
+
 namespace emit::tool {
-namespace {
-
-/// A text in the spelling of TOML.
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') {
-      out += '\\';
-      out += c;
-    } else if (static_cast<unsigned char>(c) < 0x20) {
-      out += fmt::format("\\u{:04x}", static_cast<unsigned int>(c));
-    } else {
-      out += c;
-    }
-  }
-  return out + "\"";
-}
-
-}  // namespace
-
 std::vector<SkeletonMaterial> skeleton_materials(const scene::SceneSummary& model,
                                                  std::span<const scene::Material> library) {
   double sum_m2 = 0.0;
@@ -56,8 +38,8 @@ std::string skeleton_text(const scene::SceneSummary& model,
       "epoch_utc = {}   # simulation time 0; an offset such as +02:00 may take the place of Z\n"
       "default_material = {}          # for glTF materials that nothing maps\n\n"
       "[place]\nlat_deg = {}\nlon_deg = {}\nheight_m = {}\n\n",
-      quoted(options.name), options.epoch_utc, quoted(options.default_material), options.lat_deg,
-      options.lon_deg, options.height_m);
+      toml_quoted(options.name), options.epoch_utc, toml_quoted(options.default_material),
+      options.lat_deg, options.lon_deg, options.height_m);
   out +=
       "[weather]                      # clear sky; file = \"weather.csv\" takes a measured table\n";
   if (options.weather) {
@@ -69,11 +51,11 @@ std::string skeleton_text(const scene::SceneSummary& model,
   out += "\n";
   if (!options.ground_gltf.empty()) {
     out += fmt::format("[[object]]\nname = \"ground\"\ngltf = {}\nmaterial = {}\n\n",
-                       quoted(options.ground_gltf), quoted(options.ground_material));
+                       toml_quoted(options.ground_gltf), toml_quoted(options.ground_material));
   }
   // The model stands with its lowest point on the ground.
-  out +=
-      fmt::format("[[object]]\nname = {}\ngltf = {}\n", quoted(options.name), quoted(options.gltf));
+  out += fmt::format("[[object]]\nname = {}\ngltf = {}\n", toml_quoted(options.name),
+                     toml_quoted(options.gltf));
   if (options.scale != 1.0) {
     out += fmt::format("scale = {}                    # guessed from its size: REVIEW\n",
                        options.scale);
@@ -88,13 +70,14 @@ std::string skeleton_text(const scene::SceneSummary& model,
     const std::string share = fmt::format("{:.0f} % of the surface", 100.0 * each.area_frac);
     if (each.guess.material.empty()) {
       out += fmt::format("# {} = \"?\"   # {}; nothing in the name says what it is: REVIEW\n",
-                         quoted(each.gltf_material), share);
+                         toml_quoted(each.gltf_material), share);
     } else if (each.guess.exact) {
-      out += fmt::format("{} = {}   # {}\n", quoted(each.gltf_material),
-                         quoted(each.guess.material), share);
+      out += fmt::format("{} = {}   # {}\n", toml_quoted(each.gltf_material),
+                         toml_quoted(each.guess.material), share);
     } else {
-      out += fmt::format("{} = {}   # {}; guessed by '{}': REVIEW\n", quoted(each.gltf_material),
-                         quoted(each.guess.material), share, each.guess.word);
+      out +=
+          fmt::format("{} = {}   # {}; guessed by '{}': REVIEW\n", toml_quoted(each.gltf_material),
+                      toml_quoted(each.guess.material), share, each.guess.word);
     }
   }
   // The camera stands in front, to the left, a little above.

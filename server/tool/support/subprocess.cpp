@@ -11,9 +11,13 @@
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
+#include <fstream>
+#include <iterator>
 #include <string_view>
 #include <system_error>
 #include <thread>
+
+#include "tool/support/interrupt.hpp"
 
 extern char** environ;
 
@@ -73,6 +77,25 @@ std::optional<int> Subprocess::wait(std::chrono::milliseconds timeout) {
 
 void Subprocess::send_signal(int signal_number) noexcept {
   if (pid_ > 0 && !status_) ::kill(pid_, signal_number);
+}
+
+physics::Result<void> run_program(const std::vector<std::string>& arguments,
+                                  const std::filesystem::path& log) {
+  auto process = Subprocess::start(arguments, log);
+  if (!process) return tl::unexpected(std::move(process.error()));
+  std::optional<int> status;
+  while (!(status = process->wait(std::chrono::milliseconds(200)))) {
+    if (InterruptGuard::interrupted()) return make_error(ErrorCode::internal, "interrupted");
+  }
+  if (*status != 0) {
+    std::ifstream text(log);
+    const std::string said{std::istreambuf_iterator<char>(text), std::istreambuf_iterator<char>()};
+    return make_error(
+        ErrorCode::io,
+        fmt::format("{} ended with exit code {}: {}",
+                    std::filesystem::path(arguments.front()).filename().string(), *status, said));
+  }
+  return {};
 }
 
 std::optional<std::filesystem::path> find_program(const std::string& name) {

@@ -41,6 +41,12 @@ class Subprocess {
   std::optional<int> status_;
 };
 
+/// Runs a program to its end. `log` receives both output streams. Errors: those of
+/// Subprocess::start(); io, naming the program with what it said, when its exit status is not 0;
+/// internal, when an InterruptGuard has seen a signal.
+[[nodiscard]] physics::Result<void> run_program(const std::vector<std::string>& arguments,
+                                                const std::filesystem::path& log);
+
 /// Returns the first program of that name in the folders of PATH; empty if there is none.
 [[nodiscard]] std::optional<std::filesystem::path> find_program(const std::string& name);
 

@@ -100,6 +100,39 @@ TEST(Geodesy, TheLocalFrameIsARotationWithUpAlongTheNormal) {
   }
 }
 
+/// The value of PROJ 9.1.1: gdaltransform -s_srs EPSG:4326 -t_srs '+proj=ortho +lat_0=48.015
+/// +lon_0=11.015 +datum=WGS84' of 11.5, 48.3.
+TEST(Geodesy, ThePlaneOfTheHorizonIsTheOrthographicProjectionOfProj) {
+  const HorizonPlane plane({degrees(48.015), degrees(11.015), Metres(123.0)});
+  const auto point = plane.ellipsoid_point(Metres(35982.531170232), Metres(31803.1874481195));
+  ASSERT_TRUE(point);
+  EXPECT_LT(
+      glm::distance(point->position_ecef_m, ecef_m({degrees(48.3), degrees(11.5), Metres(0.0)})),
+      1e-6);
+}
+
+TEST(Geodesy, PointsOfTheHorizonsPlaneComeBackWithTheirNormals) {
+  for (const KnownPlace& known : kPlaces) {
+    GeoPlace foot = known.place();
+    foot.height = Metres(0.0);
+    const HorizonPlane plane(known.place());
+    for (const double east_m : {-400e3, -50e3, 0.0, 1.0, 300e3}) {
+      for (const double north_m : {-300e3, -1.0, 0.0, 50e3, 400e3}) {
+        const auto point = plane.ellipsoid_point(Metres(east_m), Metres(north_m));
+        ASSERT_TRUE(point);
+        const glm::dvec3 enu =
+            glm::transpose(ecef_from_enu(foot)) * (point->position_ecef_m - ecef_m(foot));
+        EXPECT_NEAR(enu.x, east_m, 1e-8);
+        EXPECT_NEAR(enu.y, north_m, 1e-8);
+        const GeoPlace place = place_at_ecef(point->position_ecef_m);
+        EXPECT_NEAR(place.height.value(), 0.0, 1e-8);
+        EXPECT_LT(glm::distance(point->up_ecef, ecef_from_enu(place)[2]), 1e-12);
+      }
+    }
+    EXPECT_FALSE(plane.ellipsoid_point(Metres(6.4e6), Metres(0.0)));
+  }
+}
+
 TEST(Geodesy, HeadingPitchAndRollComeBack) {
   for (const double heading : {-3.1, -1.0, 0.0, 0.5, 3.1}) {
     for (const double pitch : {-1.57, -0.4, 0.0, 1.0, 1.57}) {

@@ -80,6 +80,7 @@ const std::vector<OutputCase>& output_cases() {
     add({"campaign", "no.toml", "--out", "GOOD"}, {"--json"}, {"--out"});
     add({"scene", "check", "box"}, {"--json"});
     add({"scene", "preview", "box", "--out", "GOOD"}, {"--out"});
+    add({"scene", "terrain", "no.tif"}, {}, {"--out"});
     add({"doctor"}, {"--json"});
     add({"man"}, {}, {"--out"});
     add({"completion", "bash"}, {"--out"});
