@@ -647,7 +647,8 @@ GasModel::Seen GasModel::seen(const gpu::GasImage& image, const glm::uvec2& px, 
           column += physics::gas_image_column(first + glm::vec2(i % parts, i / parts) * part_px,
                                               puff.covariance_px2, part_px);
         }
-        column *= 1.0F / static_cast<float>(parts * parts) *
+        column *=
+            1.0F / static_cast<float>(parts * parts) *
             physics::gas_before(puff.range_m * puff.per_along_m, surface_m * puff.per_along_m);
       } else {
         const physics::GasLine line = physics::gas_line(ray, puff.centre_m, puff.per_across_m2,
