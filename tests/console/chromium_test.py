@@ -78,7 +78,9 @@ class Console(unittest.TestCase):
             self.assertTrue(reading.startswith(f"x {x}  y {y}"), reading)
             # The picture is not of one colour, and not that of an empty page.
             colors = self.page.evaluate(
-                "(() => { const image = document.querySelector('#image'); const copy = document.createElement('canvas');"
+                # A canvas of WebGL holds its picture only until the page has shown it: draw it anew.
+                "(() => { emitConsole.image.draw(); const image = document.querySelector('#image'); "
+                "const copy = document.createElement('canvas');"
                 "copy.width = image.width; copy.height = image.height; const context = copy.getContext('2d');"
                 "context.drawImage(image, 0, 0); const data = context.getImageData(0, 0, copy.width, copy.height).data;"
                 "const seen = new Set(); for (let i = 0; i < data.length; i += 4)"
