@@ -76,13 +76,12 @@ class Console(unittest.TestCase):
             self.assertEqual(struct.pack("<f", value), struct.pack("<f", want))
             self.assertEqual(value, float(want))
             self.assertTrue(reading.startswith(f"x {x}  y {y}"), reading)
-            # The picture is not of one colour, and not that of an empty page.
+            # The picture is not of one colour, and not that of an empty page. Read it from WebGL itself in the turn in which
+            # it is drawn, because a canvas need not keep it for longer.
             colors = self.page.evaluate(
-                # A canvas of WebGL holds its picture only until the page has shown it: draw it anew.
-                "(() => { emitConsole.image.draw(); const image = document.querySelector('#image'); "
-                "const copy = document.createElement('canvas');"
-                "copy.width = image.width; copy.height = image.height; const context = copy.getContext('2d');"
-                "context.drawImage(image, 0, 0); const data = context.getImageData(0, 0, copy.width, copy.height).data;"
+                "(() => { const image = emitConsole.image; const gl = image.gl; image.draw();"
+                "const data = new Uint8Array(4 * gl.drawingBufferWidth * gl.drawingBufferHeight);"
+                "gl.readPixels(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight, gl.RGBA, gl.UNSIGNED_BYTE, data);"
                 "const seen = new Set(); for (let i = 0; i < data.length; i += 4)"
                 "seen.add(data[i] << 16 | data[i + 1] << 8 | data[i + 2]); return seen.size; })()")
             self.assertGreater(colors, 30)

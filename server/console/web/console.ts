@@ -33,7 +33,7 @@ class Console {
   private auto = true;
   private low = 0;
   private high = 1;
-  private autoAt = 0;
+  private autoAt = -Infinity; // the first image sets the limits, however young the page is
   private frozen = false;
   private cursor: Point | null = null;
   private frameAt = 0;
@@ -206,7 +206,7 @@ class Console {
     if (channel !== this.channel) this.probes.clearHistory();
     this.channel = channel;
     element<HTMLSelectElement>("channel").value = String(channel);
-    this.autoAt = 0;
+    this.autoAt = -Infinity;
     this.save();
     this.link.next(channel);
     if (hello.channels[channel].temperature && !this.tables.has(channel)) {
