@@ -76,11 +76,10 @@ class Console(unittest.TestCase):
             self.assertEqual(struct.pack("<f", value), struct.pack("<f", want))
             self.assertEqual(value, float(want))
             self.assertTrue(reading.startswith(f"x {x}  y {y}"), reading)
-            # The picture is not of one colour, and not that of an empty page. Its limits are those of the image that it
-            # shows: automatic ones come at a slower rate than images. Read it from WebGL itself in the turn in which
+            # The picture is not of one colour, and not that of an empty page. Read it from WebGL itself in the turn in which
             # it is drawn, because a canvas need not keep it for longer.
             colors = self.page.evaluate(
-                "(() => { const image = emitConsole.image; const gl = image.gl; emitConsole.findLimits(); image.draw();"
+                "(() => { const image = emitConsole.image; const gl = image.gl; image.draw();"
                 "const data = new Uint8Array(4 * gl.drawingBufferWidth * gl.drawingBufferHeight);"
                 "gl.readPixels(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight, gl.RGBA, gl.UNSIGNED_BYTE, data);"
                 "const seen = new Set(); for (let i = 0; i < data.length; i += 4)"

@@ -33,7 +33,7 @@ class Console {
   private auto = true;
   private low = 0;
   private high = 1;
-  private autoAt = -Infinity; // the first image sets the limits, however young the page is
+  private autoAt = -Infinity;
   private frozen = false;
   private cursor: Point | null = null;
   private frameAt = 0;
@@ -234,12 +234,13 @@ class Console {
   // Limits and colours.
 
   private findLimits(): void {
-    this.autoAt = performance.now();
     const frame = this.image.frame;
     if (!this.auto || frame === null) {
       this.applyLimits();
       return;
     }
+    // Only limits that were found count: the first image sets them, however soon it comes.
+    this.autoAt = performance.now();
     const input = (id: string, fallback: number) => {
       const value = Number.parseFloat(element<HTMLInputElement>(id).value);
       return Number.isFinite(value) ? Math.min(Math.max(value, 0), 100) : fallback;
