@@ -76,8 +76,8 @@ class Console(unittest.TestCase):
             self.assertEqual(struct.pack("<f", value), struct.pack("<f", want))
             self.assertEqual(value, float(want))
             self.assertTrue(reading.startswith(f"x {x}  y {y}"), reading)
-            # The picture is not of one colour, and not that of an empty page. Read it from WebGL itself in the turn in which
-            # it is drawn, because a canvas need not keep it for longer.
+            # The picture is not of one colour, and not that of an empty page. Read it from WebGL itself in the turn in
+            # which it is drawn, because a canvas need not keep it for longer.
             colors = self.page.evaluate(
                 "(() => { const image = emitConsole.image; const gl = image.gl; image.draw();"
                 "const data = new Uint8Array(4 * gl.drawingBufferWidth * gl.drawingBufferHeight);"
