@@ -93,6 +93,7 @@ physics::Result<GeometryPass> GeometryPass::create(const gl::EglContext& context
     if (setup.seen) defines.push_back({"EMIT_SEEN", "1"});
   }
   if (objects) defines.push_back({"EMIT_OBJECTS", "1"});
+  if (setup.clutter) defines.push_back({"EMIT_CLUTTER", "1"});
   if (setup.shade == Shade::of_entities) defines.push_back({"EMIT_SHADE", "1"});
   auto program = gl::Program::graphics("passes/geometry.vert", "passes/geometry.frag", defines);
   if (!program) return tl::unexpected(std::move(program.error()));
@@ -113,8 +114,16 @@ physics::Result<GeometryPass> GeometryPass::create(const gl::EglContext& context
       pass.ids_ = gl::Texture(GL_R16UI, width, height);
       glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT2, pass.ids_.id(), 0);
     }
-    const GLenum targets[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1, GL_COLOR_ATTACHMENT2};
-    glNamedFramebufferDrawBuffers(id, objects ? 3 : 2, targets);
+    GLsizei count = objects ? 3 : 2;
+    constexpr std::array<GLenum, 4> kTargets{GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1,
+                                             GL_COLOR_ATTACHMENT2, GL_COLOR_ATTACHMENT3};
+    if (setup.clutter) {
+      pass.clutter_ = gl::Texture(GL_RGBA32UI, width, height);
+      glNamedFramebufferTexture(id, kTargets[static_cast<std::size_t>(count)], pass.clutter_.id(),
+                                0);
+      ++count;
+    }
+    glNamedFramebufferDrawBuffers(id, count, kTargets.data());
   } else {
     pass.depth_m_ = gl::Texture(GL_R32F, width, height);
     pass.normal_ = gl::Texture(GL_RG16_SNORM, width, height);
@@ -186,6 +195,7 @@ void GeometryPass::bind_textures() const noexcept {
     incoming_.bind(EMIT_TEX_INCOMING);
     glBindImageTexture(EMIT_IMG_SURFACE, surface_.id(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RG32UI);
     if (ids_.id() != 0) ids_.bind(EMIT_TEX_IDS);
+    if (clutter_.id() != 0) clutter_.bind(EMIT_TEX_CLUTTER_PIXELS);
     return;
   }
   depth_m_.bind(EMIT_TEX_DEPTH);

@@ -72,6 +72,8 @@ class BandModel final : public BandLights {
     float range_m = 0.0F;
     float sin_elevation = 0.0F;    ///< of the line of sight
     float sensor_height_m = 0.0F;  ///< above sea level
+    float clutter_sd = 0.0F;       ///< mean of the clutter's field over the pixel
+    float clutter_variance_k2 = 0.0F;  ///< of the temperature within the pixel
   };
   /// Splits the radiance of a pixel of the instant of update(). `incoming_w_m2_sr` is what arrives
   /// at the surface from everything but the sun. Twin of radiance.comp, in float32 like that.
@@ -100,6 +102,9 @@ class BandModel final : public BandLights {
   [[nodiscard]] std::uint32_t max_terms() const noexcept { return max_terms_; }
   /// Index of the first emissivity in tables(). Emissivities are ordered by material, then by band.
   [[nodiscard]] std::uint32_t first_emissivity() const noexcept { return first_emissivity_; }
+  /// Index of the first change of an emissivity per standard deviation of the clutter, in the same
+  /// order.
+  [[nodiscard]] std::uint32_t first_emissivity_sd() const noexcept { return first_emissivity_sd_; }
   /// Inverse of the band radiance, by band. Setup only.
   [[nodiscard]] std::vector<physics::ApparentTemperature> apparent_temperatures() const;
 
@@ -153,6 +158,7 @@ class BandModel final : public BandLights {
   std::uint32_t air_terms_ = 0;
   std::uint32_t air_table_ = 0;
   std::uint32_t max_terms_ = 0;
+  std::uint32_t first_emissivity_sd_ = 0;
   std::uint32_t first_emissivity_ = 0;
 };
 

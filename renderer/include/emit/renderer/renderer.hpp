@@ -148,10 +148,14 @@ struct FrameView {
   std::span<const float> object_id;                      ///< empty unless asked for
   std::span<const float> sun_cosine;                     ///< empty unless asked for
   std::span<const float> sky_frac;                       ///< empty unless asked for
-  /// Radiance that arrives at the surface from everything but the sun, one plane per band, and the
-  /// material; empty unless OutputOptions::terms.
+  /// Radiance that arrives at the surface from everything but the sun, one plane per band, the
+  /// material, and its clutter: mean of the field over the pixel, what it adds to the temperature,
+  /// and the variance of the temperature within the pixel. Empty unless OutputOptions::terms.
   std::vector<std::span<const float>> incoming_w_m2_sr;
   std::span<const float> material;
+  std::span<const float> clutter_sd;
+  std::span<const float> clutter_k;
+  std::span<const float> clutter_variance_k2;
   std::span<const float> coverage_frac;  ///< empty unless asked for
   FrameStats stats;
   std::uint8_t quality_level = 0;  ///< quality level that was rendered
