@@ -18,6 +18,7 @@ struct RadianceContent {
   std::uint32_t terms = 0;      ///< largest number of exponential terms of a band
   std::uint32_t outputs = 0;    ///< planes behind those of the bands, EMIT_OUTPUT_*
   bool clutter = false;         ///< some materials vary from place to place
+  bool clutter_emissivity = false;  ///< the emissivity of some does
 };
 
 /// Radiance of every pixel in all bands (part 5 of the paper). See passes/radiance.comp.

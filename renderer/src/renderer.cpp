@@ -246,7 +246,7 @@ class GlRenderer final : public Renderer {
 };
 
 /// Content that the radiance pass is compiled for.
-RadianceContent radiance_content(const BandModel& bands, bool clutter,
+RadianceContent radiance_content(const BandModel& bands, const ClutterFields& clutter,
                                  const OutputOptions& output) {
   return {.bands = static_cast<std::uint32_t>(bands.params().size()),
           .air_terms = bands.air_terms(),
@@ -258,7 +258,8 @@ RadianceContent radiance_content(const BandModel& bands, bool clutter,
                      (output.object ? EMIT_OUTPUT_OBJECT : 0U) |
                      (output.sun ? EMIT_OUTPUT_SUN : 0U) | (output.sky ? EMIT_OUTPUT_SKY : 0U) |
                      (output.terms ? EMIT_OUTPUT_TERMS : 0U),
-          .clutter = clutter};
+          .clutter = !clutter.empty(),
+          .clutter_emissivity = clutter.change_emissivity()};
 }
 
 /// True when some object of the scenario is an entity.
@@ -785,7 +786,7 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
   auto geometry_pass = GeometryPass::create(*context, geometry_setup);
   if (!geometry_pass) return tl::unexpected(std::move(geometry_pass.error()));
   auto radiance_pass =
-      RadiancePass::create(scenario.thermal, radiance_content(*bands, !clutter->empty(), output),
+      RadiancePass::create(scenario.thermal, radiance_content(*bands, *clutter, output),
                            context->software());
   if (!radiance_pass) return tl::unexpected(std::move(radiance_pass.error()));
   FramePasses passes{std::move(*geometry_pass), std::move(*radiance_pass), {}, {}, {}};

@@ -4,12 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <glm/packing.hpp>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/surface/power_law_field.hpp"
 
 namespace emit::renderer {
@@ -17,34 +16,41 @@ namespace {
 
 static_assert(scene::Clutter::kSide == EMIT_CLUTTER_SIDE);
 constexpr std::size_t kSide = EMIT_CLUTTER_SIDE;
-constexpr std::size_t kRows = kSide + kSide / 2;
+constexpr std::size_t kColumns = kSide + kSide / 4 * 3;
+constexpr std::size_t kRows = 2 * kSide;
 
 struct Texel {
   std::uint32_t upper = 0;  ///< the texel and its neighbour in the row
   std::uint32_t lower = 0;  ///< the same of the next row
 };
 
-/// Places the levels of a field: the finest one, and below it the others side by side. In the last
-/// column below, row l has the variance that level l keeps.
+/// Value in steps of 14 bits.
+std::uint32_t steps_of(float sd) noexcept {
+  constexpr double kMiddle = 8191.5;
+  const double steps = kMiddle * (1.0 + static_cast<double>(sd) / scene::Clutter::kMostSd);
+  return static_cast<std::uint32_t>(std::lround(std::clamp(steps, 0.0, 2.0 * kMiddle)));
+}
+
+/// Places the levels of a field as passes/clutter.glsl reads them.
 void place(std::span<const physics::FieldLevel> levels, std::span<Texel> out) {
+  EMIT_CHECK_OP(levels.size(), ==, std::size_t{EMIT_CLUTTER_LEVELS});
   for (std::size_t l = 0; l < levels.size(); ++l) {
     const physics::FieldLevel& level = levels[l];
-    const std::size_t first_x = l == 0 ? 0 : kSide - 2 * level.side;
-    const std::size_t first_y = l == 0 ? 0 : kSide;
-    const auto value = [&](std::size_t x, std::size_t y) {
-      constexpr auto kMost = static_cast<float>(scene::Clutter::kMostSd);
-      const float sd = level.values[(y % level.side) * level.side + x % level.side];
-      return std::clamp(sd / kMost, -1.0F, 1.0F);
+    const std::size_t pair = l / 2;
+    const std::size_t first_x = l % 2 == 0 ? 0 : kSide >> pair;
+    const std::size_t first_y = 2 * kSide - (2 * kSide >> pair);
+    const auto lost = static_cast<std::uint32_t>(
+        std::lround(255.0 * std::clamp(1.0 - level.variance, 0.0, 1.0)));
+    const auto steps = [&](std::size_t x, std::size_t y) {
+      return steps_of(level.values[(y % level.side) * level.side + x % level.side]);
     };
     for (std::size_t y = 0; y < level.side; ++y) {
       for (std::size_t x = 0; x < level.side; ++x) {
-        out[(first_y + y) * kSide + first_x + x] = {
-            glm::packSnorm2x16(glm::vec2(value(x, y), value(x + 1, y))),
-            glm::packSnorm2x16(glm::vec2(value(x, y + 1), value(x + 1, y + 1)))};
+        const auto row = [&](std::size_t v) { return steps(x, v) | steps(x + 1, v) << 14U; };
+        out[(first_y + y) * kColumns + first_x + x] = {row(y) | (lost & 15U) << 28U,
+                                                       row(y + 1) | lost >> 4U << 28U};
       }
     }
-    out[(kSide + l) * kSide + kSide - 1].upper =
-        std::bit_cast<std::uint32_t>(static_cast<float>(level.variance));
   }
 }
 
@@ -60,6 +66,8 @@ physics::Result<ClutterFields> ClutterFields::build(std::span<const scene::Mater
     drawn.field = static_cast<std::uint32_t>(fields.size());
     drawn.tiles_per_m = 1.0 / material.clutter->period_m();
     drawn.heat = scene::varies_in_heat(material);
+    out.emissivity_ = out.emissivity_ || material.clutter->emissivity_sd_frac != 0.0 ||
+                      !material.clutter->band_emissivity_sd_frac.empty();
   }
   if (fields.empty()) return out;
   if (fields.size() > kMost) {
@@ -68,9 +76,9 @@ physics::Result<ClutterFields> ClutterFields::build(std::span<const scene::Mater
                                            "possible",
                                            fields.size(), kMost));
   }
-  out.texture_ = gl::Texture(GL_RG32UI, static_cast<GLsizei>(kSide),
+  out.texture_ = gl::Texture(GL_RG32UI, static_cast<GLsizei>(kColumns),
                              static_cast<GLsizei>(kRows * fields.size()));
-  std::vector<Texel> texels(kSide * kRows);
+  std::vector<Texel> texels(kColumns * kRows);
   for (std::size_t i = 0; i < fields.size(); ++i) {
     const scene::Clutter& clutter = *fields[i];
     place(physics::power_law_field({.period_m = clutter.period_m(),
@@ -81,7 +89,7 @@ physics::Result<ClutterFields> ClutterFields::build(std::span<const scene::Mater
                                    kSide),
           texels);
     glTextureSubImage2D(out.texture_.id(), 0, 0, static_cast<GLint>(i * kRows),
-                        static_cast<GLsizei>(kSide), static_cast<GLsizei>(kRows), GL_RG_INTEGER,
+                        static_cast<GLsizei>(kColumns), static_cast<GLsizei>(kRows), GL_RG_INTEGER,
                         GL_UNSIGNED_INT, texels.data());
   }
   return out;

@@ -16,19 +16,22 @@ namespace emit::renderer {
 class ClutterFields {
  public:
   /// Largest number of materials with clutter: every OpenGL 4.5 device takes textures that high.
-  static constexpr std::size_t kMost = 16384 / (EMIT_CLUTTER_SIDE + EMIT_CLUTTER_SIDE / 2);
+  static constexpr std::size_t kMost = 16384 / (2 * EMIT_CLUTTER_SIDE);
 
   /// Makes the field of each material with clutter. Errors: config (more than kMost of them).
   [[nodiscard]] static physics::Result<ClutterFields> build(
       std::span<const scene::Material> materials);
 
   [[nodiscard]] bool empty() const noexcept { return texture_.id() == 0; }
+  /// True if the emissivity of some material varies.
+  [[nodiscard]] bool change_emissivity() const noexcept { return emissivity_; }
   /// How draws of each material use the fields.
   [[nodiscard]] std::span<const DrawnClutter> of_materials() const noexcept { return drawn_; }
   void bind() const noexcept { texture_.bind(EMIT_TEX_CLUTTER); }
 
  private:
   std::vector<DrawnClutter> drawn_;
+  bool emissivity_ = false;
   gl::Texture texture_;
 };
 

@@ -7,7 +7,7 @@
 //   EMIT_AIR_TABLE  bit per band: the air is a table
 //   EMIT_AIR_MODEL  bit per band: the air is built in
 //   EMIT_OUTPUTS    planes besides radiance, EMIT_OUTPUT_*
-//   EMIT_CLUTTER    defined: some materials vary from place to place
+//   EMIT_CLUTTER    defined: some materials vary from place to place; EMIT_CLUTTER_EMISSIVITY: their emissivity too
 //   EMIT_ROWS       number of blocks of 8 x 8 pixels, one below the other, that a work group computes
 #include "passes/gbuffer.glsl"
 #include "passes/tables.glsl"
@@ -155,9 +155,11 @@ vec2 leaving_w_m2_sr(uint band, Seen seen, float incoming, inout bool clamped) {
                   float(band * frame.band_lut_nodes));
   float emissivity_frac = texelFetch(band_lut, int(frame.first_emissivity + seen.material * EMIT_BANDS + band)).r;
   float emitting_k = seen.temperature_k;
-#ifdef EMIT_CLUTTER
+#ifdef EMIT_CLUTTER_EMISSIVITY
   emissivity_frac += seen.clutter_sd * texelFetch(band_lut, int(frame.first_emissivity_sd + seen.material * EMIT_BANDS +
                                                                 band)).r;
+#endif
+#ifdef EMIT_CLUTTER
   // Radiance is averaged over the pixel, not temperature: to second order the mean is that of a warmer surface.
   float per_k = 1.0 / max(emitting_k, 1.0);
   emitting_k += 0.5 * seen.clutter_variance_k2 * (bands[band].curvature_k * per_k - 2.0) * per_k;

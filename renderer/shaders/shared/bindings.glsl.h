@@ -98,10 +98,10 @@
 #define EMIT_GAS_SAMPLES_SHIFT 2u
 #define EMIT_GAS_FAR_M 1e7f
 
-// Clutter: texels along the edge of a tile, levels of a field, values that stand for +-1 in its texels, places in a pixel
-// at which it is taken, and the value at which twins of samples are solved.
+// Clutter: texels along the edge of a tile, levels of a field, its largest magnitude, places in a pixel at which it is
+// taken at most, and the value at which twins of samples are solved.
 #define EMIT_CLUTTER_SIDE 1024
-#define EMIT_CLUTTER_LEVELS 11
+#define EMIT_CLUTTER_LEVELS 17
 #define EMIT_CLUTTER_MOST_SD 4.0
 #define EMIT_CLUTTER_TAPS 8
 #define EMIT_CLUTTER_TWIN_SD 1.5

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <numbers>
@@ -65,28 +66,30 @@ TEST(PowerLawField, SpectrumFollowsThePowerLawBetweenItsWavelengthsAndIsEmptyOut
   }
 }
 
-TEST(PowerLawField, LevelsAreTheFieldConvolvedWithAGaussianOfHalfATexel) {
+TEST(PowerLawField, LevelsKeepTheLongWavesAndLeaveTheShortOnesOut) {
   const auto levels = power_law_field(kLaw, kSide);
-  ASSERT_EQ(levels.size(), 8U);
+  ASSERT_EQ(levels.size(), 11U);
   const FieldLevel& field = levels.front();
-  for (std::size_t l = 1; l < 5; ++l) {
+  for (std::size_t l = 1; l < 8; ++l) {
     const FieldLevel& level = levels[l];
-    ASSERT_EQ(level.side, kSide >> l);
+    ASSERT_EQ(level.side, (l % 2 == 0 ? kSide : kSide / 4 * 3) >> (l / 2));
     double variance = 0.0;
     for (const float value : level.values) variance += std::pow(value, 2);
     variance /= static_cast<double>(level.values.size());
     EXPECT_NEAR(variance, level.variance, 1e-5 + 1e-3 * level.variance) << l;
     EXPECT_LT(level.variance, levels[l - 1].variance);
-    // Of the coefficients that its texels can hold, each is weakened as the Gaussian does it.
+    // From 0.05 to 0.3 waves per texel less and less is kept.
     for (const auto& [x, y] : {std::pair{4, 1}, {0, 5}, {-3, 3}, {7, 2}, {12, 0}}) {
       const double turns_per_texel = std::hypot(x, y) / static_cast<double>(level.side);
       if (2 * std::max(std::abs(x), std::abs(y)) >= static_cast<int>(level.side)) continue;
-      const double kept = std::exp(-std::pow(std::numbers::pi * turns_per_texel, 2));
+      const double part = std::clamp((turns_per_texel - 0.05) / 0.25, 0.0, 1.0);
+      const double kept = std::pow(std::cos(0.5 * std::numbers::pi * part), 4);
       const double whole = power(field, x, y);
       EXPECT_NEAR(power(level, x, y), kept * whole, 1e-3 * whole) << l;
     }
   }
-  EXPECT_NEAR(at(levels.back(), 0, 0), 0.0, 1e-6);
+  EXPECT_EQ(levels.back().side, 4U);
+  EXPECT_LT(levels.back().variance, 1e-6);
 }
 
 TEST(PowerLawField, SeedsGiveFieldsThatDoNotCorrelate) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "emit/physics/surface/power_law_field.hpp"
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <complex>
@@ -16,9 +18,9 @@ namespace {
 
 using Complex = std::complex<double>;
 
-/// Transforms a row of a power of two of values in place, X_k = sum x_n exp(-+ 2 pi i n k / N), by
-/// Cooley and Tukey's way (1965). `sign` is -1 forwards and +1 back; nothing is scaled.
-void transform(std::span<Complex> row, double sign) {
+/// Transforms a row in place, X_k = sum x_n exp(sign 2 pi i n k / N), by Cooley and Tukey's way
+/// (1965). Nothing is scaled. @pre the length is a power of two
+void transform_even(std::span<Complex> row, double sign) {
   const std::size_t n = row.size();
   // Put the values into the order of reversed bits.
   for (std::size_t i = 1, j = 0; i < n; ++i) {
@@ -28,20 +30,41 @@ void transform(std::span<Complex> row, double sign) {
     if (i < j) std::swap(row[i], row[j]);
   }
   // Join transforms of half the length.
+  std::vector<Complex> turns(n / 2);
+  for (std::size_t k = 0; k < turns.size(); ++k) {
+    turns[k] = std::polar(1.0, sign * 2.0 * kPi * static_cast<double>(k) / static_cast<double>(n));
+  }
   for (std::size_t length = 2; length <= n; length *= 2) {
-    const double angle = sign * 2.0 * kPi / static_cast<double>(length);
-    std::vector<Complex> turns(length / 2);
-    for (std::size_t k = 0; k < turns.size(); ++k) {
-      turns[k] = std::polar(1.0, angle * static_cast<double>(k));
-    }
+    const std::size_t stride = n / length;
     for (std::size_t first = 0; first < n; first += length) {
       for (std::size_t k = 0; k < length / 2; ++k) {
         const Complex even = row[first + k];
-        const Complex odd = row[first + k + length / 2] * turns[k];
+        const Complex odd = row[first + k + length / 2] * turns[k * stride];
         row[first + k] = even + odd;
         row[first + k + length / 2] = even - odd;
       }
     }
+  }
+}
+
+/// Does the same for three times a power of two too.
+void transform(std::span<Complex> row, double sign) {
+  const std::size_t n = row.size();
+  if (n % 3 != 0) {
+    transform_even(row, sign);
+    return;
+  }
+  // Join the transforms of every third value.
+  std::array<std::vector<Complex>, 3> parts;
+  for (std::size_t part = 0; part < 3; ++part) {
+    for (std::size_t i = part; i < n; i += 3) parts[part].push_back(row[i]);
+    transform_even(parts[part], sign);
+  }
+  for (std::size_t k = 0; k < n; ++k) {
+    const Complex turn =
+        std::polar(1.0, sign * 2.0 * kPi * static_cast<double>(k) / static_cast<double>(n));
+    const std::size_t i = k % (n / 3);
+    row[k] = parts[0][i] + turn * (parts[1][i] + turn * parts[2][i]);
   }
 }
 
@@ -62,6 +85,14 @@ void transform_square(std::vector<Complex>& values, std::size_t side, double sig
 double waves_of(std::size_t index, std::size_t side) noexcept {
   const auto k = static_cast<double>(index);
   return index <= side / 2 ? k : k - static_cast<double>(side);
+}
+
+/// Share of a coefficient that a level keeps, by its waves per texel.
+double kept_frac(double waves) noexcept {
+  constexpr double kWholeWaves = 0.05;
+  constexpr double kNoWaves = 0.3;
+  const double part = std::clamp((waves - kWholeWaves) / (kNoWaves - kWholeWaves), 0.0, 1.0);
+  return std::pow(std::cos(0.5 * kPi * part), 2);
 }
 
 }  // namespace
@@ -98,7 +129,12 @@ std::vector<FieldLevel> power_law_field(const PowerLaw& law, std::size_t side) {
   for (Complex& value : spectrum) value *= scale;
   // Make each level from the coefficients that it can hold.
   std::vector<FieldLevel> levels;
-  for (std::size_t now = side; now >= 1; now /= 2) {
+  std::vector<std::size_t> sides;
+  for (std::size_t now = side; now >= 4; now /= 2) {
+    sides.push_back(now);
+    if (now > 4) sides.push_back(now / 4 * 3);
+  }
+  for (const std::size_t now : sides) {
     FieldLevel level{.side = now, .variance = 0.0, .values = std::vector<float>(now * now)};
     std::vector<Complex> part(now * now);
     const double texel_frac = now == side ? 0.0 : 1.0 / static_cast<double>(now);
@@ -107,11 +143,11 @@ std::vector<FieldLevel> power_law_field(const PowerLaw& law, std::size_t side) {
         const double wave_x = waves_of(x, now);
         const double wave_y = waves_of(y, now);
         // The coefficient at half the sampling rate stands for two of them: leave it out.
-        if (now > 1 && (2 * x == now || 2 * y == now)) continue;
+        if (2 * x == now || 2 * y == now) continue;
         const std::size_t from_x = wave_x < 0.0 ? side - (now - x) : x;
         const std::size_t from_y = wave_y < 0.0 ? side - (now - y) : y;
-        const double spread = kPi * texel_frac * std::hypot(wave_x, wave_y);
-        const Complex value = spectrum[from_y * side + from_x] * std::exp(-0.5 * spread * spread);
+        const Complex value =
+            spectrum[from_y * side + from_x] * kept_frac(texel_frac * std::hypot(wave_x, wave_y));
         part[y * now + x] = value;
         level.variance += std::norm(value);
       }

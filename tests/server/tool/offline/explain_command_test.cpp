@@ -39,7 +39,7 @@ double number(const std::string& json, const std::string& key) {
   return text.empty() || text == "null" ? NAN : std::stod(text);
 }
 
-TEST(CliExplain, the_terms_add_up_to_the_pixel_through_air_of_every_kind) {
+TEST(CliExplain, the_terms_add_up_to_the_pixel_through_air_of_every_kind_and_over_clutter) {
   const TemporaryFolder folder;
   const std::string terms =
       "atmosphere.band=[{band=\"8-12\",terms=[[0.7,0.1],[0.3,2.0]],vertical_transmittance_frac=0.6}"
@@ -50,6 +50,9 @@ TEST(CliExplain, the_terms_add_up_to_the_pixel_through_air_of_every_kind) {
       {"--set", "atmosphere.file=\"share:atmospheres/midlatitude_summer_ground.csv\""},
       {"--set", "atmosphere.enabled=false"},
       {"--set", terms},
+      {"--set",
+       "clutter=[{material=\"asphalt\",shortest_m=0.05,longest_m=1.5,solar_absorptance_sd_frac=0.02,"
+       "emissivity_sd_frac=0.005}]"},
       {"--set", "thermal.method=\"per-frame\""}};
   for (std::size_t a = 0; a < airs.size(); ++a) {
     // A lit roof, a wall, the road and its shadow; without built-in air one pixel suffices.

@@ -25,11 +25,11 @@ struct FieldLevel {
   std::vector<float> values;
 };
 
-/// Returns the field and its means over ever larger texels: level l has texels of 2^l times the edge
-/// of the finest one, down to a single texel. The field has mean 0 and variance 1. Its Fourier
-/// coefficients have random phases, and its values are nearly Gaussian. Level l is the field
-/// convolved with a Gaussian of a standard deviation of half its texel, as far as its texels can hold
-/// that: nothing is aliased.
+/// Returns the field and its means over ever larger texels: levels of `side`, 3/4 `side`, `side`/2,
+/// 3/8 `side` and so on, down to 4. The field has mean 0 and variance 1. Its Fourier coefficients have
+/// random phases, and its values are nearly Gaussian. In all levels but the first a coefficient of f
+/// waves per texel is multiplied by cos^2(pi/2 x) with x = (f - 0.05) / 0.25 held in 0..1: little is
+/// left that bilinear interpolation would turn into ripples, and nothing is aliased.
 /// @pre `side` is a power of two, 4..4096; two texels <= shortest_m < longest_m <= period_m
 [[nodiscard]] std::vector<FieldLevel> power_law_field(const PowerLaw& law, std::size_t side);
 
