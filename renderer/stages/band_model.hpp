@@ -16,6 +16,7 @@
 #include "emit/scene/scene_desc.hpp"
 #include "history/band_lights.hpp"
 #include "shared/frame_params.glsl.h"
+#include "stages/lobe_model.hpp"
 
 namespace emit::renderer {
 
@@ -72,6 +73,10 @@ class BandModel final : public BandLights {
     float range_m = 0.0F;
     float sin_elevation = 0.0F;    ///< of the line of sight
     float sensor_height_m = 0.0F;  ///< above sea level
+    // Glossy surfaces only: unit vectors, relworld.
+    glm::vec3 normal{0.0F, 0.0F, 1.0F};
+    glm::vec3 to_viewer{0.0F, 0.0F, 1.0F};
+    glm::vec3 to_sun{0.0F, 0.0F, 1.0F};
   };
   /// Splits the radiance of a pixel of the instant of update(). `incoming_w_m2_sr` is what arrives
   /// at the surface from everything but the sun. Twin of radiance.comp, in float32 like that.
@@ -89,8 +94,9 @@ class BandModel final : public BandLights {
   [[nodiscard]] std::uint32_t air_terms() const noexcept { return air_terms_; }
   /// Bits of the bands with built-in air.
   [[nodiscard]] std::uint32_t air_model() const noexcept { return air_model_; }
-  /// Tables of the built-in air for the camera of the frame, one behind the other
-  /// (lib/air_view.glsl). One node without built-in air.
+  /// The sky as lobes see it, if there are glossy materials (lib/lobe.glsl), then tables of the
+  /// built-in air for the camera of the frame, one behind the other (lib/air_view.glsl). One node
+  /// without either.
   [[nodiscard]] std::span<const physics::AirView::Node> air_nodes() const noexcept {
     return air_nodes_;
   }
@@ -100,6 +106,10 @@ class BandModel final : public BandLights {
   [[nodiscard]] std::uint32_t max_terms() const noexcept { return max_terms_; }
   /// Index of the first emissivity in tables(). Emissivities are ordered by material, then by band.
   [[nodiscard]] std::uint32_t first_emissivity() const noexcept { return first_emissivity_; }
+  /// Index of the first number of the lobes in tables(); 0 without glossy materials.
+  [[nodiscard]] std::uint32_t first_lobe() const noexcept { return first_lobe_; }
+  /// True if air_nodes() differ from frame to frame.
+  [[nodiscard]] bool air_nodes_change() const noexcept { return air_model_ != 0 || lobes_; }
   /// Inverse of the band radiance, by band. Setup only.
   [[nodiscard]] std::vector<physics::ApparentTemperature> apparent_temperatures() const;
 
@@ -140,6 +150,8 @@ class BandModel final : public BandLights {
   [[nodiscard]] double warmer_k(const Entry& entry, const Instant& now) const noexcept;
   [[nodiscard]] double sky_warmer_k(const Entry& entry, const Instant& now) const noexcept;
   void light_of(const Entry& entry, const Instant& now, BandLight& out) const noexcept;
+  /// Sets the sky of a band as lobes see it.
+  void update_lobe_sky(std::size_t band, const Instant& now) noexcept;
   std::vector<Entry> entries_;
   std::vector<gpu::BandParams> params_;
   std::vector<float> tables_;
@@ -154,6 +166,8 @@ class BandModel final : public BandLights {
   std::uint32_t air_table_ = 0;
   std::uint32_t max_terms_ = 0;
   std::uint32_t first_emissivity_ = 0;
+  std::uint32_t first_lobe_ = 0;
+  std::optional<LobeModel> lobes_;  ///< empty without glossy materials
 };
 
 /// Returns the transmittance of built-in air on a line of sight for what a source of a temperature
