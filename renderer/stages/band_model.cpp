@@ -172,6 +172,7 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
   // The sky keeps to one dew point over the whole run: the humidity of a weather table does not
   // count.
   model.dew_point_k_ = scene::usual_dew_point_k(scenario);
+  model.lobes_ = LobeModel::build(scenario, materials);
   if (auto views = model.build_views(scenario); !views) return tl::unexpected(views.error());
   // Append the tables of the air behind those of the bands.
   for (std::size_t i = 0; i < model.entries_.size(); ++i) {
@@ -190,7 +191,6 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
     }
   }
   // Append the emissivities of all materials, then the lobes of glossy ones.
-  model.lobes_ = LobeModel::build(scenario, materials);
   model.first_emissivity_ = static_cast<std::uint32_t>(model.tables_.size());
   for (std::size_t m = 0; m < materials.size(); ++m) {
     for (std::size_t b = 0; b < scenario.bands.size(); ++b) {

@@ -13,7 +13,7 @@
 namespace emit::renderer {
 
 /// Glossy materials in the bands of the picture: tables of their lobes, and the sky as lobes see it
-/// (physics.md section 15). lib/lobe.glsl reads both.
+/// (physics.md section 5). lib/lobe.glsl reads both.
 /// Owner: BandModel. Thread: the one of the renderer. Real time: build() is setup only, the rest is
 /// RT-safe.
 class LobeModel {

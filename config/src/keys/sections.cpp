@@ -97,7 +97,7 @@ const std::vector<SectionDoc>& scenario_sections() {
                   spread_keys(), scene::MaterialSpread{}),
       section_doc("material.gloss", false,
                   "Gloss of a material: emission by angle and a lobe around the mirror direction "
-                  "([physics.md](../renderer/docs/physics.md), section 15). One source of its "
+                  "([physics.md](../renderer/docs/physics.md), section 5). One source of its "
                   "reflectance is required: `index`, constants of your own, or a table by angle.",
                   gloss_keys(), scene::Gloss{}),
       section_doc("display", false, "Limits of the false-colour display.", display_keys(),

@@ -3,7 +3,7 @@
 #define EMIT_LIB_LOBE
 
 // Glossy surfaces: emission by angle, and a lobe that sees the sky, what stands below it and the sun (physics.md section
-// 15). Twin of renderer/stages/lobe_model.cpp, which makes the tables.
+// 5). Twin of renderer/stages/lobe_model.cpp, which makes the tables.
 // The including shader defines EMIT_LOBE_TABLE(index), a float of the table of lobes, and EMIT_LOBE_SKY(index), a vec4
 // of the sky as lobes see it.
 const int kLobeNodes = 32;
@@ -58,7 +58,7 @@ float lobe_unmasked_both(float from, float to) {
 }
 
 // Light of the sun that facets reflect to the viewer, per irradiance and per reflectance of the facets, sr-1 (physics.md
-// eq. 56). `across2` is the squared sine between the half-way direction and the normal.
+// eq. 64). `across2` is the squared sine between the half-way direction and the normal.
 float lobe_glint_per_sr(float slope2, bool gaussian, float view_cosine, float facet_cosine, float across2,
                         float open) {
   // Spread the facets by the sun's disc, and show no more than the disc itself.

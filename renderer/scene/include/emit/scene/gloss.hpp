@@ -9,7 +9,7 @@
 #include "emit/physics/surface/facets.hpp"
 #include "emit/physics/surface/optical_constants.hpp"
 
-/// Glossy surfaces (physics.md section 15): emission by angle, and a lobe around the mirror
+/// Glossy surfaces (physics.md section 5): emission by angle, and a lobe around the mirror
 /// direction. Setup only; any thread.
 namespace emit::scene {
 
