@@ -54,7 +54,7 @@ static_assert(EMIT_MAX_ATMOSPHERE_TERMS == limits::kMaxAtmosphereTerms);
 constexpr std::size_t kBlockAlignment = 256;
 /// Largest number of planes: radiance of all bands, temperature, depth, object, sun, sky, what
 /// arrives in all bands, material, coverage.
-constexpr std::size_t kMaxPlanes = 2 * EMIT_MAX_BANDS + 10;
+constexpr std::size_t kMaxPlanes = 2 * EMIT_MAX_BANDS + 11;
 
 /// Checks the limits of the renderer. Errors: config, naming the value and the limit.
 Result<void> check_limits(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
@@ -265,7 +265,7 @@ bool has_entities(const scene::ScenarioDesc& scenario) {
 std::size_t surface_planes(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
   return scenario.bands.size() + (output.temperature ? 1U : 0U) + (output.depth ? 1U : 0U) +
          (output.object ? 1U : 0U) + (output.sun ? 1U : 0U) + (output.sky ? 1U : 0U) +
-         (output.terms ? scenario.bands.size() + 4 : 0U);
+         (output.terms ? scenario.bands.size() + 5 : 0U);
 }
 
 /// Number of planes of the output image.
@@ -356,6 +356,7 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
     if (output_.terms) {
       view.material = next_plane();
       for (std::span<const float>& plane_of_axis : view.normal) plane_of_axis = next_plane();
+      view.glint_per_sr = next_plane();
     }
     if (output_.coverage) view.coverage_frac = next_plane();
   }
@@ -523,6 +524,7 @@ std::vector<RadianceTerms> GlRenderer::radiance_terms(const FrameView& view, con
   seen.normal = {view.normal[0][i], view.normal[1][i], view.normal[2][i]};
   seen.to_viewer = -glm::normalize(glm::mat3(frame_params_.relworld_from_sensor) * ray);
   seen.to_sun = frame_params_.to_sun;
+  seen.glint_per_sr = view.glint_per_sr[i];
   std::vector<RadianceTerms> out;
   for (std::size_t b = 0; b < bands_.bands(); ++b) {
     out.push_back(bands_.terms(b, seen, view.incoming_w_m2_sr[b][i]));

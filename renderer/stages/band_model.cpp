@@ -433,7 +433,8 @@ RadianceTerms BandModel::terms(std::size_t band, const Seen& seen,
   if (lobes_) {
     const auto glossy = lobes_->parts(
         band,
-        {seen.material, seen.normal, seen.to_viewer, seen.to_sun, seen.open_frac, seen.sun_cosine},
+        {seen.material, seen.normal, seen.to_viewer, seen.to_sun, seen.open_frac, seen.sun_cosine,
+         seen.glint_per_sr},
         {incoming_w_m2_sr, static_cast<float>(physics::sky_at_tilt(sky, seen.normal.z)),
          params.surroundings_radiance_w_m2_sr},
         std::span(air_nodes_).first(LobeModel::kSkyTable));

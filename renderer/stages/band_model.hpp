@@ -73,10 +73,11 @@ class BandModel final : public BandLights {
     float range_m = 0.0F;
     float sin_elevation = 0.0F;    ///< of the line of sight
     float sensor_height_m = 0.0F;  ///< above sea level
-    // Glossy surfaces only: unit vectors, relworld.
+    // Glossy surfaces only: unit vectors, relworld, and FrameView::glint_per_sr.
     glm::vec3 normal{0.0F, 0.0F, 1.0F};
     glm::vec3 to_viewer{0.0F, 0.0F, 1.0F};
     glm::vec3 to_sun{0.0F, 0.0F, 1.0F};
+    float glint_per_sr = 0.0F;
   };
   /// Splits the radiance of a pixel of the instant of update(). `incoming_w_m2_sr` is what arrives
   /// at the surface from everything but the sun. Twin of radiance.comp, in float32 like that.

@@ -22,42 +22,40 @@ constexpr std::size_t kBlock = 2;
 constexpr std::size_t kBandNumbers = 1 + kLobeNodes * kCurves;
 constexpr double kSkyScale = 0.03;
 const double kSkyReach = std::asinh(1.0 / kSkyScale);
-constexpr auto kDiscRad = static_cast<float>(physics::kSunSemiAngleRad);
 constexpr float kLeastShut = 0.02F;
 constexpr auto kPi = static_cast<float>(physics::kPi);
 
-/// Concentration of a von Mises-Fisher lobe whose mean direction has a length: coth k - 1/k.
-double concentration_of(double length) {
-  if (!(length > 0.0)) return 0.0;
-  double low = 0.0;
-  double high = 1e9;
-  for (int i = 0; i < 200; ++i) {
-    const double k = low > 1.0 ? std::sqrt(low * high) : 0.5 * (low + std::min(high, 2.0 * low + 2.0));
-    const double at = k > 1e-3 ? 1.0 / std::tanh(k) - 1.0 / k : k / 3.0;
-    (at < length ? low : high) = k;
+/// Radial samples of slopes, which make a lobe around the normal of a surface: the angles by which
+/// facets turn light, and their weights.
+constexpr std::size_t kRadii = 120;
+struct Turn {
+  double angle = 0.0;
+  double weight = 0.0;
+};
+std::array<Turn, kRadii> turns_of(physics::FacetSlopes slopes, double slope) {
+  std::array<Turn, kRadii> out;
+  for (std::size_t r = 0; r < kRadii; ++r) {
+    const double rest = 1.0 - (static_cast<double>(r) + 0.5) / kRadii;
+    const double steeper = rest * rest * rest;
+    const double radius =
+        slope * (slopes == physics::FacetSlopes::ggx ? std::sqrt((1.0 - steeper) / steeper)
+                                                     : std::sqrt(-std::log(steeper)));
+    out[r] = {2.0 * std::atan(radius), 3.0 * rest * rest / kRadii};
   }
-  return low;
+  return out;
 }
 
-/// Modified Bessel function of order 0 times exp(-x), by Abramowitz and Stegun 9.8.1 and 9.8.2.
-double scaled_bessel(double x) {
-  if (x < 3.75) {
-    const double t = x * x / 14.0625;
-    return std::exp(-x) *
-           (1.0 +
-            t * (3.5156229 +
-                 t * (3.0899424 +
-                      t * (1.2067492 + t * (0.2659732 + t * (0.0360768 + t * 0.0045813))))));
+/// Returns the width of the slopes whose lobe has a mean direction of a length, 0 to 1.
+double slope_of(physics::FacetSlopes slopes, double length) {
+  double low = 1e-5;
+  double high = 10.0;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = std::sqrt(low * high);
+    double mean = 0.0;
+    for (const Turn& turn : turns_of(slopes, middle)) mean += turn.weight * std::cos(turn.angle);
+    (mean > length ? low : high) = middle;
   }
-  const double t = 3.75 / x;
-  return (0.39894228 +
-          t * (0.01328592 +
-               t * (0.00225319 +
-                    t * (-0.00157565 +
-                         t * (0.00916281 +
-                              t * (-0.02057706 +
-                                   t * (0.02635537 + t * (-0.01647633 + t * 0.00392377)))))))) /
-         std::sqrt(x);
+  return low;
 }
 
 /// Weights with which lobes see the samples of the sky, and their shares in the sky.
@@ -66,55 +64,48 @@ struct SkyWeights {
   std::array<double, LobeModel::kSkyNodes> share{};
 };
 
-SkyWeights make_sky_weights() {
+SkyWeights make_sky_weights(physics::FacetSlopes slopes) {
+  constexpr std::size_t kSectors = 24;  // of half a turn
   SkyWeights out;
   for (std::size_t w = 0; w < LobeModel::kSkyWidths; ++w) {
     const double root = static_cast<double>(w) / (LobeModel::kSkyWidths - 1);
-    const double concentration = concentration_of(1.0 - std::pow(root, 4));
+    const auto turns = turns_of(slopes, slope_of(slopes, 1.0 - std::pow(root, 4)));
     for (std::size_t e = 0; e < LobeModel::kSkyElevations; ++e) {
       const std::size_t node = w * LobeModel::kSkyElevations + e;
       const double place = 2.0 * static_cast<double>(e) / (LobeModel::kSkyElevations - 1) - 1.0;
-      const double middle = std::asin(std::clamp(kSkyScale * std::sinh(kSkyReach * place), -1.0, 1.0));
-      const auto add = [&](double elevation, double weight) {
-        if (elevation < 0.0) return;
+      const double sine = std::clamp(kSkyScale * std::sinh(kSkyReach * place), -1.0, 1.0);
+      const double cosine = std::sqrt(1.0 - sine * sine);
+      const auto add = [&](double sine_of, double weight) {
+        if (sine_of < 0.0) return;
         out.share[node] += weight;
-        const double at = std::asinh(std::sin(elevation) / kSkyScale) / kSkyReach *
-                          (LobeModel::kSkySamples - 1);
+        const double at =
+            std::asinh(sine_of / kSkyScale) / kSkyReach * (LobeModel::kSkySamples - 1);
         const auto i = std::min(static_cast<std::size_t>(at), LobeModel::kSkySamples - 2);
         const double high = std::min(at - static_cast<double>(i), 1.0);
         out.weight[node][i] += weight * (1.0 - high);
         out.weight[node][i + 1] += weight * high;
       };
       if (w == 0) {
-        add(middle, 1.0);
+        add(sine, 1.0);
         continue;
       }
-      // Sum rings of equal elevation; around each, the lobe is a Bessel function.
-      constexpr int kRings = 600;
-      const double reach = concentration > 0.0 ? 7.0 / std::sqrt(concentration) : physics::kPi;
-      const double low = std::max(middle - reach, -physics::kPi / 2.0);
-      const double high = std::min(middle + reach, physics::kPi / 2.0);
-      std::array<double, kRings> weights{};
-      double sum = 0.0;
-      for (int i = 0; i < kRings; ++i) {
-        const double elevation = std::lerp(low, high, (i + 0.5) / kRings);
-        const double across = concentration * std::cos(middle) * std::cos(elevation);
-        weights[static_cast<std::size_t>(i)] =
-            std::exp(concentration * (std::cos(elevation - middle) - 1.0)) * scaled_bessel(across) *
-            std::cos(elevation);
-        sum += weights[static_cast<std::size_t>(i)];
-      }
-      for (int i = 0; i < kRings; ++i) {
-        add(std::lerp(low, high, (i + 0.5) / kRings), weights[static_cast<std::size_t>(i)] / sum);
+      for (const Turn& turn : turns) {
+        for (std::size_t k = 0; k < kSectors; ++k) {
+          const double around = physics::kPi * (static_cast<double>(k) + 0.5) / kSectors;
+          add(sine * std::cos(turn.angle) + cosine * std::sin(turn.angle) * std::cos(around),
+              turn.weight / kSectors);
+        }
       }
     }
   }
+  // The weights of the radii add up to nearly 1.
   return out;
 }
 
-const SkyWeights& sky_weights() {
-  static const SkyWeights kWeights = make_sky_weights();
-  return kWeights;
+const SkyWeights& sky_weights(physics::FacetSlopes slopes) {
+  static const SkyWeights kGgx = make_sky_weights(physics::FacetSlopes::ggx);
+  static const SkyWeights kGaussian = make_sky_weights(physics::FacetSlopes::gaussian);
+  return slopes == physics::FacetSlopes::ggx ? kGgx : kGaussian;
 }
 
 /// Place of a cosine on a curve, in float32 as the shader has it.
@@ -148,14 +139,14 @@ std::optional<LobeModel> LobeModel::build(const scene::ScenarioDesc& scenario,
     for (const scene::SpectralBand& band : scenario.bands) {
       Lobe lobe = physics::make_lobe(facets, scene::facet_optics(materials[m], band));
       model.table_.push_back(static_cast<float>(lobe.diffuse_mean_frac));
-      for (const LobeCurve* curve : {&lobe.emissivity_frac, &lobe.lobe_frac, &lobe.forward,
+      for (const LobeCurve* curve : {&lobe.emissivity_frac, &lobe.lobe_frac, &lobe.forward_ratio,
                                      &lobe.upward, &lobe.unmasked, &lobe.sun_facet}) {
         for (const double value : *curve) model.table_.push_back(static_cast<float>(value));
       }
       model.lobes_[m].push_back(lobe);
     }
   }
-  (void)sky_weights();
+  (void)sky_weights(physics::FacetSlopes::ggx);
   return model;
 }
 
@@ -173,12 +164,15 @@ double LobeModel::sky_sample_sine(std::size_t sample) noexcept {
 void LobeModel::update_sky(std::size_t band, const std::array<double, kSkySamples>& sky_w_m2_sr,
                            std::span<SkyNode> out) const noexcept {
   EMIT_DCHECK(out.size() == kSkyTable && band < bands_);
-  const SkyWeights& weights = sky_weights();
-  for (std::size_t node = 0; node < kSkyNodes; ++node) {
-    double sum = 0.0;
-    for (std::size_t s = 0; s < kSkySamples; ++s) sum += weights.weight[node][s] * sky_w_m2_sr[s];
-    out[node][band] = static_cast<float>(sum);
-    out[kSkyNodes + node][0] = static_cast<float>(weights.share[node]);
+  for (const auto slopes : {physics::FacetSlopes::ggx, physics::FacetSlopes::gaussian}) {
+    const SkyWeights& weights = sky_weights(slopes);
+    const std::size_t first = slopes == physics::FacetSlopes::ggx ? 0 : 2 * kSkyNodes;
+    for (std::size_t node = 0; node < kSkyNodes; ++node) {
+      double sum = 0.0;
+      for (std::size_t s = 0; s < kSkySamples; ++s) sum += weights.weight[node][s] * sky_w_m2_sr[s];
+      out[first + node][band] = static_cast<float>(sum);
+      out[first + kSkyNodes + node][0] = static_cast<float>(weights.share[node]);
+    }
   }
 }
 
@@ -195,8 +189,7 @@ std::optional<LobeModel::Parts> LobeModel::parts(std::size_t band, const Seen& s
   // Find the directions.
   const float view_up = glm::dot(seen.normal, seen.to_viewer);
   const float view_cosine = std::clamp(view_up, 1e-3F, 1.0F);
-  const glm::vec3 along = seen.normal * view_up - seen.to_viewer;
-  const glm::vec3 forward = along / std::sqrt(std::max(glm::dot(along, along), 1e-12F));
+  const glm::vec3 forward = seen.normal * view_up - seen.to_viewer;
   const float sun_up = glm::dot(seen.normal, seen.to_sun);
   glm::vec3 half_way = seen.to_viewer + seen.to_sun;
   half_way /= std::sqrt(std::max(glm::dot(half_way, half_way), 1e-12F));
@@ -222,9 +215,10 @@ std::optional<LobeModel::Parts> LobeModel::parts(std::size_t band, const Seen& s
                  float{kSkyWidths - 1});
   const float column = std::min(std::floor(along_sky), float{kSkyElevations - 2});
   const float row = std::min(std::floor(across_sky), float{kSkyWidths - 2});
+  const std::size_t first_sky = table_[block + 1] > 0.5F ? 2 * kSkyNodes : 0;
   const auto at = [&](std::size_t first, std::size_t member) {
-    const std::size_t i =
-        first + static_cast<std::size_t>(row) * kSkyElevations + static_cast<std::size_t>(column);
+    const std::size_t i = first_sky + first + static_cast<std::size_t>(row) * kSkyElevations +
+                          static_cast<std::size_t>(column);
     const float behind = along_sky - column;
     const float near = std::lerp(sky[i][member], sky[i + 1][member], behind);
     const float far =
@@ -250,27 +244,7 @@ std::optional<LobeModel::Parts> LobeModel::parts(std::size_t band, const Seen& s
   out.diffuse_sun_per_sr = out.diffuse_frac * to_sun /
                            (std::max(table_[numbers], 1e-6F) * kPi) *
                            seen.sun_cosine;
-  if (!(sun_up > 1e-4F && glm::dot(seen.normal, half_way) > 0.0F)) return out;
-  const std::size_t first_band = block + kBlock;
-  const float from = curve(first_band, kUnmasked, view);
-  const float to = curve(first_band, kUnmasked, sun);
-  const float open = from > 0.0F && to > 0.0F ? 1.0F / (1.0F / from + 1.0F / to - 1.0F) : 0.0F;
-  const glm::vec3 off = glm::cross(seen.normal, half_way);
-  const float across2 = glm::dot(off, off);
-  const float slope2 = table_[block];
-  const float disc2 = 0.25F * kDiscRad * kDiscRad;
-  const float wide2 = std::sqrt(
-      (slope2 + disc2) * (slope2 + disc2 / std::max(facet_cosine * facet_cosine, 1e-4F)));
-  const float cos2 = std::max(1.0F - across2, 1e-6F);
-  const float spread = wide2 * cos2 + across2;
-
-  const float density = table_[block + 1] > 0.5F
-                            ? std::exp(-across2 / (cos2 * wide2)) / (kPi * wide2 * cos2 * cos2)
-                            : wide2 / (kPi * spread * spread);
-  const float glint =
-      std::min(density * open / (4.0F * view_cosine), 1.0F / (kPi * kDiscRad * kDiscRad));
-  out.glint_per_sr = curve(numbers, kSunFacet, place_of(facet_cosine)) * glint *
-                     std::min(seen.sun_cosine / std::max(sun_up, 1e-4F), 1.0F);
+  out.glint_per_sr = curve(numbers, kSunFacet, place_of(facet_cosine)) * seen.glint_per_sr;
   return out;
 }
 

@@ -33,9 +33,9 @@ class LobeModel {
   static constexpr std::size_t kSkyElevations = 33;
   static constexpr std::size_t kSkyWidths = 9;
   static constexpr std::size_t kSkyNodes = kSkyElevations * kSkyWidths;
-  /// Nodes of sky_table(): the radiance of all bands at each node, then the share of the lobe that
-  /// sees the sky.
-  static constexpr std::size_t kSkyTable = 2 * kSkyNodes;
+  /// Nodes of the table for both kinds of facets: the radiance of all bands at each node, then the
+  /// share of the lobe that sees the sky.
+  static constexpr std::size_t kSkyTable = 4 * kSkyNodes;
   using SkyNode = std::array<float, 4>;
 
   /// Elevations at which update_sky() takes the radiance of the sky.
@@ -54,6 +54,7 @@ class LobeModel {
     glm::vec3 to_sun{0.0F, 0.0F, 1.0F};     ///< unit, relworld
     float open_frac = 0.0F;                 ///< share of the hemisphere that shows sky
     float sun_cosine = 0.0F;                ///< with the visible share of the sun
+    float glint_per_sr = 0.0F;              ///< of facets without loss, as the shader has it
   };
   /// Light in the band.
   struct Light {

@@ -28,11 +28,12 @@ const int kLobeSunFacet = 5;
 // A glossy surface of a pixel.
 struct LobePixel {
   int block;          // place of the material's block; 0: the material is not glossy
+  int sky;            // first node of the sky for its kind of facets
   vec2 view;          // place of the direction of view on the curves
   vec2 sun;           // place of the direction of the sun
   vec2 facet;         // place of the angle between facets that reflect the sun and the view
   vec3 normal;
-  vec3 forward;       // unit vector along the surface, away from the viewer
+  vec3 forward;       // along the surface, away from the viewer, as long as the sine of the view
   float sky_seen;     // share of the sky before the face that nothing hides
   float open_frac;    // share of the hemisphere that shows sky
   float sun_cosine;   // cosine of the sun's incidence times its visible share
@@ -75,10 +76,11 @@ float lobe_glint_per_sr(float slope2, bool gaussian, float view_cosine, float fa
 LobePixel lobe_pixel(int block, vec3 normal, vec3 to_viewer, vec3 to_sun, float open_frac, float sun_cosine) {
   LobePixel p;
   p.block = block;
+  bool gaussian = EMIT_LOBE_TABLE(block + 1) > 0.5;
+  p.sky = gaussian ? 2 * kLobeSkyElevations * kLobeSkyWidths : 0;
   p.normal = normal;
   float view_cosine = clamp(dot(normal, to_viewer), 1e-3, 1.0);
-  vec3 along = normal * dot(normal, to_viewer) - to_viewer;
-  p.forward = along * inversesqrt(max(dot(along, along), 1e-12));
+  p.forward = normal * dot(normal, to_viewer) - to_viewer;
   p.view = lobe_place(view_cosine);
   p.open_frac = open_frac;
   p.sky_seen = min(open_frac / max(0.5 + 0.5 * normal.z, 1e-3), 1.0);
@@ -93,22 +95,23 @@ LobePixel lobe_pixel(int block, vec3 normal, vec3 to_viewer, vec3 to_sun, float 
   p.facet = lobe_place(facet_cosine);
   float open = lobe_unmasked_both(lobe_curve(block, 0u, kLobeUnmasked, p.view),
                                   lobe_curve(block, 0u, kLobeUnmasked, p.sun));
-  float glint = lobe_glint_per_sr(EMIT_LOBE_TABLE(block), EMIT_LOBE_TABLE(block + 1) > 0.5, view_cosine, facet_cosine,
+  float glint = lobe_glint_per_sr(EMIT_LOBE_TABLE(block), gaussian, view_cosine, facet_cosine,
                                   dot(off, off), open);
   bool lit = sun_up > 1e-4 && dot(normal, half_way) > 0.0;
   p.glint_per_sr = lit ? glint * min(sun_cosine / max(sun_up, 1e-4), 1.0) : 0.0;
   return p;
 }
 
-// Sky as a lobe sees it: x = radiance of the band times the share of the lobe in the sky, y = that share.
-vec2 lobe_sky(uint band, float sine, float length_frac) {
+// Sky as a lobe sees it: x = radiance of the band times the share of the lobe in the sky, y = that share. `sky` is the
+// first node for the kind of facets.
+vec2 lobe_sky(uint band, int sky, float sine, float length_frac) {
   float x = sine / kLobeSkyScale;
   float root = log(abs(x) + sqrt(x * x + 1.0)) * kLobeSkyNodesPerUnit;
   float along = clamp(16.0 + (x < 0.0 ? -root : root), 0.0, float(kLobeSkyElevations - 1));
   float across = clamp(8.0 * sqrt(sqrt(max(1.0 - length_frac, 0.0))), 0.0, float(kLobeSkyWidths - 1));
   float column = min(floor(along), float(kLobeSkyElevations - 2));
   float row = min(floor(across), float(kLobeSkyWidths - 2));
-  int first = int(row) * kLobeSkyElevations + int(column);
+  int first = sky + int(row) * kLobeSkyElevations + int(column);
   int shares = kLobeSkyElevations * kLobeSkyWidths;
   vec2 near = mix(vec2(EMIT_LOBE_SKY(first)[band], EMIT_LOBE_SKY(shares + first).x),
                   vec2(EMIT_LOBE_SKY(first + 1)[band], EMIT_LOBE_SKY(shares + first + 1).x), along - column);
@@ -130,7 +133,7 @@ vec2 lobe_leaving_w_m2_sr(uint band, LobePixel p, float black, float incoming, f
   vec3 mean = lobe_curve(p.block, band, kLobeForward, p.view) * p.forward +
               lobe_curve(p.block, band, kLobeUpward, p.view) * p.normal;
   float length_frac = max(length(mean), 1e-3);
-  vec2 seen = lobe_sky(band, mean.z / length_frac, length_frac);
+  vec2 seen = lobe_sky(band, p.sky, mean.z / length_frac, length_frac);
   // No part of the lobe lies behind the face, so a level one sees nothing below the horizon.
   float low = min(1.0, (1.0 - p.normal.z) / (2.0 * (1.0 - length_frac) + 1e-6));
   seen *= p.sky_seen / max(seen.y + (1.0 - seen.y) * low, 1e-3);

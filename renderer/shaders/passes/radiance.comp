@@ -267,11 +267,11 @@ void write_pixel(ivec2 px) {
   if ((EMIT_OUTPUTS & EMIT_OUTPUT_TERMS) != 0u) {
     for (uint i = 0u; i < EMIT_BANDS; ++i) planes[plane++ * plane_px + pixel] = surface ? incoming[i] : 0.0;
     planes[plane++ * plane_px + pixel] = surface ? float(seen.material) : 0.0;
-    vec3 normal = vec3(0.0);
+    vec4 glossy = vec4(0.0);
 #ifdef EMIT_LOBES
-    if (lobe.block != 0) normal = lobe.normal;
+    if (lobe.block != 0) glossy = vec4(lobe.normal, lobe.glint_per_sr);
 #endif
-    for (int axis = 0; axis < 3; ++axis) planes[plane++ * plane_px + pixel] = normal[axis];
+    for (int i = 0; i < 4; ++i) planes[plane++ * plane_px + pixel] = glossy[i];
   }
   // Count the pixel if it is flagged.
   int flags = (nonfinite ? EMIT_FLAG_NONFINITE : 0) + (clamped ? EMIT_FLAG_CLAMPED : 0);

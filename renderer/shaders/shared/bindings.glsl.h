@@ -101,7 +101,8 @@
 #define EMIT_OUTPUT_OBJECT 4u
 #define EMIT_OUTPUT_SUN 8u
 #define EMIT_OUTPUT_SKY 16u
-// Radiance that arrives at the surface, a plane for each band, then the material, then the normal of a glossy surface.
+// Radiance that arrives at the surface, a plane for each band, then the material, then the normal and the glint of a
+// glossy surface.
 #define EMIT_OUTPUT_TERMS 32u
 
 // Indices of FrameStatsGpu.flagged_px.

@@ -20,15 +20,16 @@ LobeCurve curve_of(auto&& value) {
   return out;
 }
 
-/// Integral over the directions above a surface, of a function of the direction.
+/// Integral over the directions above a surface, of a function that is the same on both sides of
+/// the plane of x and z.
 template <class Function>
-double over_hemisphere(const Function& function, int rings = 1500, int sectors = 1500) {
+double over_hemisphere(const Function& function, int rings = 700, int sectors = 350) {
   double sum = 0.0;
   for (int i = 0; i < rings; ++i) {
     const double z = (i + 0.5) / rings;
     const double flat = std::sqrt(1.0 - z * z);
     for (int k = 0; k < sectors; ++k) {
-      const double angle = 2.0 * kPi * (k + 0.5) / sectors;
+      const double angle = kPi * (k + 0.5) / sectors;
       sum += function(glm::dvec3(flat * std::cos(angle), flat * std::sin(angle), z));
     }
   }
@@ -42,7 +43,7 @@ double smith_by_slopes(const Facets& facets, double cosine) {
   // 1 / (1 + Lambda) = cosine / int max(0, cosine - s sine) p(s) ds, with p the slopes along a line.
   const double sine = std::sqrt(1.0 - cosine * cosine);
   double seen = 0.0;
-  constexpr int kSteps = 400000;
+  constexpr int kSteps = 40000;
   for (int i = 0; i < kSteps; ++i) {
     const double u = -1.0 + 2.0 * (i + 0.5) / kSteps;
     const double s = facets.slope * u / (1.0 - u * u);
@@ -82,11 +83,11 @@ TEST(Facets, HideEachOtherAsTheirSlopesSay) {
 // Integral of the lobe over incoming directions, with the density of facets per direction.
 TEST(Facets, LobeHoldsWhatItsDirectionsReflect) {
   const LobeCurve water = curve_of([](double c) { return fresnel_reflectance_frac(1.33, 0.0, c); });
-  for (const Facets& facets : {kFacets[0], kFacets[1], kFacets[2], kFacets[3], kFacets[4]}) {
+  for (const Facets& facets : {kFacets[0], kFacets[2], kFacets[4]}) {
     for (const LobeCurve& reflectance : {curve_of([](double) { return 1.0; }), water}) {
       const Lobe lobe = make_lobe(facets, {reflectance, reflectance, 1.0, 1.0});
-      for (const std::size_t node : {8U, 16U, 24U, 31U}) {
-        const double cosine = lobe_cosine(node);
+      for (const std::size_t node : {10U, 20U, 31U}) {
+        const double cosine = lobe_view_cosine(node);
         const glm::dvec3 view = view_at(cosine);
         glm::dvec3 mean(0.0);
         const auto reflected = [&](const glm::dvec3& light) {
@@ -100,9 +101,9 @@ TEST(Facets, LobeHoldsWhatItsDirectionsReflect) {
           mean += part * light;
           return part;
         });
-        mean *= 2.0 * kPi / (1500.0 * 1500.0) / total;
+        mean *= 2.0 * kPi / (700.0 * 350.0) / total;
         EXPECT_NEAR(lobe.lobe_frac[node], total, 2e-3 * total + 2e-4) << facets.slope << ' ' << node;
-        EXPECT_NEAR(lobe.forward[node], -mean.x, 4e-3) << facets.slope << ' ' << node;
+        EXPECT_NEAR(lobe.forward_ratio[node] * view.x, -mean.x, 4e-3) << facets.slope << ' ' << node;
         EXPECT_NEAR(lobe.upward[node], mean.z, 4e-3) << facets.slope << ' ' << node;
         EXPECT_LE(lobe.lobe_frac[node], 1.0);
       }
@@ -131,10 +132,9 @@ TEST(Facets, MirrorReflectsAlongItsMirrorDirection) {
   const LobeCurve glass = curve_of([](double c) { return fresnel_reflectance_frac(1.5, 0.0, c); });
   const Lobe lobe = make_lobe({FacetSlopes::ggx, 0.001}, {glass, glass, 1.0, 1.0});
   for (const std::size_t node : {6U, 16U, 31U}) {
-    const double cosine = lobe_cosine(node);
     EXPECT_NEAR(lobe.lobe_frac[node], glass[node], 2e-3 * glass[node]);
-    EXPECT_NEAR(lobe.upward[node], cosine, 1e-3);
-    EXPECT_NEAR(lobe.forward[node], std::sqrt(1.0 - cosine * cosine), 1e-3);
+    EXPECT_NEAR(lobe.upward[node], lobe_view_cosine(node), 1e-3);
+    EXPECT_NEAR(lobe.forward_ratio[node], 1.0, 1e-3);
   }
 }
 
@@ -167,7 +167,6 @@ TEST(Facets, GlintSpreadsTheDiscOfTheSun) {
   }
 }
 
-// Into all directions together, the glint carries what the lobe reflects.
 TEST(Facets, GlintOfAMirrorIsTheDisc) {
   const double peak = glint_per_sr({FacetSlopes::ggx, 1e-5}, {0.8, 0.8, 1.0, 0.8}, kSunSemiAngleRad);
   EXPECT_NEAR(peak * kPi * std::pow(std::sin(kSunSemiAngleRad), 2), 1.0, 0.01);
@@ -214,7 +213,7 @@ TEST(Facets, SeaEmissivityIsThatOfItsVisibleFacets) {
       double emitted = 0.0;
       double caught = 0.0;
       double area = 0.0;
-      constexpr int kSteps = 400;
+      constexpr int kSteps = 160;
       for (int i = -kSteps; i <= kSteps; ++i) {
         for (int k = -kSteps; k <= kSteps; ++k) {
           const double x = 6.0 * sigma * i / kSteps;

@@ -82,10 +82,6 @@ TEST(OpticalConstants, WindowGlassHasTheEmissivityOfTheStandard) {
     hemispherical += (1.0 - band_reflectance_frac(glass, all, Kelvin(283.0), cosine)) / 200;
   }
   EXPECT_NEAR(hemispherical, 0.837, 0.01);
-  std::printf("glass normal %.4f hemispherical %.4f\n", normal, hemispherical);
-  for (const Band& b : {Band{3, 5, {}}, Band{3.4, 4.1, {}}, Band{8, 12, {}}, Band{7.7, 9.3, {}}}) {
-    std::printf("band %g-%g: glass %.4f water %.4f\n", b.lo_um, b.hi_um, 1 - band_reflectance_frac(glass, b, Kelvin(300.0), 1.0), 1 - band_reflectance_frac(optical_constants(IndexTable::water), b, Kelvin(300.0), 1.0));
-  }
 }
 
 }  // namespace

@@ -146,6 +146,10 @@ void set_even_sky(scene::ScenarioDesc& scenario, double kelvin) {
     scenario.atmosphere.bands.push_back(air);
   }
   scenario.weather[0].environment_k = kelvin;
+  // Find the long-wave irradiance at which there are no clouds.
+  scenario.weather[0].air_k = 290.0;
+  scenario.weather[0].longwave_down_w_m2 = physics::sky_longwave_w_m2(
+      physics::Kelvin(290.0), physics::Kelvin(physics::usual_dew_point_k(290.0)), 0.0, {});
 }
 
 physics::SunPosition sun_of(const scene::ScenarioDesc& scenario) {
@@ -220,7 +224,7 @@ TEST(Gloss, APanelReflectsTheSkyAroundItsMirrorDirection) {
   double worst_k = 0.0;
   const physics::ApparentTemperature apparent({8.0, 12.0, {}});
   for (const double slope : {0.005, 0.1, 0.4}) {
-    for (const double tilt_deg : {0.0, 30.0, 60.0, 90.0}) {
+    for (const double tilt_deg : {0.0, 40.0, 90.0}) {
       for (const double view_deg : {10.0, 50.0, 75.0}) {
         for (const double turn_deg : {0.0, 90.0, 180.0}) {
           const double tilt = tilt_deg * physics::kDegree;
@@ -256,8 +260,8 @@ TEST(Gloss, APanelReflectsTheSkyAroundItsMirrorDirection) {
           double lobe = 0.0;
           double share = 0.0;
           double even = 0.0;
-          constexpr int kRings = 1500;
-          constexpr int kSectors = 360;
+          constexpr int kRings = 500;
+          constexpr int kSectors = 180;
           // Slopes of facets, dense where they are many.
           for (int i = 0; i < kRings; ++i) {
             const double rest = std::pow(1.0 - (i + 0.5) / kRings, 3);
@@ -354,6 +358,7 @@ TEST(Gloss, TheSeaGlintsAsCoxAndMunkSay) {
     ASSERT_GT(irradiance, 0.01);
     for (const double wind_m_s : {2.0, 5.0, 12.0}) {
       auto scenario = held_scenario(gltf, 288.0, sea(wind_m_s));
+      scenario.materials[0].emissivity_frac = 1.0;  // all that enters the water stays there
       scenario.sensor.fov_h_rad = 0.35;
       const glm::dvec3 sun = sun_of(scenario).direction_enu;
       // Look at the middle of the glint, and past it.
@@ -412,11 +417,12 @@ TEST(Gloss, AMirrorShowsTheSunAndItsShadowDoesNot) {
   const glm::dvec3 spot = from_m + glm::dvec3(sun.x, sun.y, -sun.z) * (10.0 / sun.z);
   const glm::dvec3 roof = spot + 20.0 * sun;
   auto shaded = held_scenario(
-      write_quads("shaded", {ground(300.0, 300.0),
+      write_quads("shaded", {ground(40.0, 40.0),
                              {roof + glm::dvec3(-4, -4, 0), roof + glm::dvec3(4, -4, 0),
                               roof + glm::dvec3(4, 4, 0), roof + glm::dvec3(-4, 4, 0)}},
                   true),
       288.0, gloss_of(1.5, 0.001));
+  shaded.thermal.method = scene::ThermalMethod::per_frame;
   shaded.bands = {kBands[0]};
   shaded.sensor.fov_h_rad = 0.02;
   const auto dark = sunlight(shaded, pose, 0);

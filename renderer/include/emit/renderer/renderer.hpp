@@ -149,11 +149,12 @@ struct FrameView {
   std::span<const float> sun_cosine;                     ///< empty unless asked for
   std::span<const float> sky_frac;                       ///< empty unless asked for
   /// Radiance that arrives at the surface from everything but the sun, one plane per band, the
-  /// material, and the normal of glossy surfaces (east, north, up; 0 elsewhere). Empty unless
-  /// OutputOptions::terms.
+  /// material, and of glossy surfaces the normal (east, north, up) and the sun's light that facets
+  /// without loss would reflect, per irradiance (0 elsewhere). Empty unless OutputOptions::terms.
   std::vector<std::span<const float>> incoming_w_m2_sr;
   std::span<const float> material;
   std::array<std::span<const float>, 3> normal;
+  std::span<const float> glint_per_sr;
   std::span<const float> coverage_frac;  ///< empty unless asked for
   FrameStats stats;
   std::uint8_t quality_level = 0;  ///< quality level that was rendered

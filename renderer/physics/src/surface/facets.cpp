@@ -91,7 +91,7 @@ Lobe make_lobe(const Facets& facets, const FacetOptics& optics) {
   LobeCurve once{};    // reflected once, of an interface with the facets' reflectance
   LobeCurve escape{};  // the same of one that reflects everything
   for (std::size_t node = 0; node < kLobeNodes; ++node) {
-    const double cosine = lobe_cosine(node);
+    const double cosine = lobe_view_cosine(node);
     const double sine = std::sqrt(1.0 - cosine * cosine);
     const double from = unmasked_frac(facets, cosine);
     double weights = 0.0;
@@ -122,7 +122,7 @@ Lobe make_lobe(const Facets& facets, const FacetOptics& optics) {
     }
     out.unmasked[node] = from;
     // A surface that reflects nothing still needs a direction.
-    out.forward[node] = once[node] > 0.0 ? along / once[node] : sine;
+    out.forward_ratio[node] = once[node] > 0.0 ? along / (once[node] * sine) : 1.0;
     out.upward[node] = once[node] > 0.0 ? up / once[node] : cosine;
     escape[node] /= weights;
     once[node] /= weights;

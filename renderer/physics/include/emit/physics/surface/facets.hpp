@@ -48,6 +48,11 @@ using LobeCurve = std::array<double, kLobeNodes>;
   const double root = static_cast<double>(node) / (kLobeNodes - 1);
   return node == 0 ? 1e-4 : root * root;
 }
+/// Returns the cosine at which a lobe is computed for a node: the last one stands for 1, where the
+/// lobe has no direction along the surface.
+[[nodiscard]] constexpr double lobe_view_cosine(std::size_t node) noexcept {
+  return node + 1 == kLobeNodes ? 0.9998 : lobe_cosine(node);
+}
 /// Returns a curve between its nodes, linear in the root of the cosine.
 [[nodiscard]] inline double lobe_at(const LobeCurve& curve, double cosine) noexcept {
   const double place = (kLobeNodes - 1) * std::sqrt(cosine > 0.0 ? (cosine < 1.0 ? cosine : 1.0) : 0.0);
@@ -72,9 +77,10 @@ struct Lobe {
   LobeCurve emissivity_frac{};
   LobeCurve lobe_frac{};     ///< reflected by facets once
   LobeCurve diffuse_frac{};  ///< reflected by the body, and by several facets
-  /// Mean of the directions that the lobe comes from: along the surface, away from the viewer, and
-  /// along the normal. Its length is 1 for a mirror and less for a wide lobe.
-  LobeCurve forward{};
+  /// Mean of the directions that the lobe comes from: along the surface, away from the viewer, over
+  /// the sine of the view, which a mirror has 1 of, and along the normal. The length of the mean is
+  /// 1 for a mirror and less for a wide lobe.
+  LobeCurve forward_ratio{};
   LobeCurve upward{};
   LobeCurve unmasked{};   ///< unmasked_frac()
   LobeCurve sun_facet{};  ///< reflectance of a facet for sunlight that goes into the lobe
