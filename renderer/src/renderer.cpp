@@ -538,10 +538,10 @@ std::vector<RadianceTerms> GlRenderer::radiance_terms(const FrameView& view, con
     RadianceTerms& terms = out[b];
     terms.gas_frac = gas.through_frac[b];
     terms.gas_w_m2_sr = gas.added_w_m2_sr[b];
-    for (double* part : {&terms.emission_w_m2_sr, &terms.sky_w_m2_sr, &terms.neighbours_w_m2_sr,
-                         &terms.sun_w_m2_sr, &terms.lobe_sky_w_m2_sr,
-                         &terms.lobe_neighbours_w_m2_sr, &terms.glint_w_m2_sr,
-                         &terms.path_w_m2_sr}) {
+    for (double* part :
+         {&terms.emission_w_m2_sr, &terms.sky_w_m2_sr, &terms.neighbours_w_m2_sr,
+          &terms.sun_w_m2_sr, &terms.lobe_sky_w_m2_sr, &terms.lobe_neighbours_w_m2_sr,
+          &terms.glint_w_m2_sr, &terms.path_w_m2_sr}) {
       *part *= terms.gas_frac;
     }
   }

@@ -7,6 +7,7 @@
 
 #include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
+#include "emit/scene/gloss_optics.hpp"
 #include "shared/bindings.glsl.h"
 
 namespace emit::renderer {
@@ -98,7 +99,6 @@ SkyWeights make_sky_weights(physics::FacetSlopes slopes) {
       }
     }
   }
-  // The weights of the radii add up to nearly 1.
   return out;
 }
 
@@ -123,7 +123,8 @@ CurvePlace place_of(float cosine) noexcept {
 
 std::optional<LobeModel> LobeModel::build(const scene::ScenarioDesc& scenario,
                                           std::span<const scene::Material> materials) {
-  if (std::ranges::none_of(materials, [](const scene::Material& m) { return m.gloss.has_value(); })) {
+  if (std::ranges::none_of(materials,
+                           [](const scene::Material& m) { return m.gloss.has_value(); })) {
     return std::nullopt;
   }
   LobeModel model;
@@ -241,9 +242,8 @@ std::optional<LobeModel::Parts> LobeModel::parts(std::size_t band, const Seen& s
   out.lobe_neighbours_w_m2_sr = share * (1.0F - sky_share) * other;
   // Reflect the sun.
   const float to_sun = 1.0F - curve(numbers, kEmissivity, sun) - curve(numbers, kShare, sun);
-  out.diffuse_sun_per_sr = out.diffuse_frac * to_sun /
-                           (std::max(table_[numbers], 1e-6F) * kPi) *
-                           seen.sun_cosine;
+  out.diffuse_sun_per_sr =
+      out.diffuse_frac * to_sun / (std::max(table_[numbers], 1e-6F) * kPi) * seen.sun_cosine;
   out.glint_per_sr = curve(numbers, kSunFacet, place_of(facet_cosine)) * seen.glint_per_sr;
   return out;
 }

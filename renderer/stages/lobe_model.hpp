@@ -46,7 +46,7 @@ class LobeModel {
   void update_sky(std::size_t band, const std::array<double, kSkySamples>& sky_w_m2_sr,
                   std::span<SkyNode> out) const noexcept;
 
-  /// What a pixel shows of a glossy surface.
+  /// Glossy surface of a pixel.
   struct Seen {
     std::uint32_t material = 0;
     glm::vec3 normal{0.0F, 0.0F, 1.0F};     ///< unit, relworld
@@ -62,7 +62,7 @@ class LobeModel {
     float sky_w_m2_sr = 0.0F;           ///< of the sky as a face of that tilt sees it
     float surroundings_w_m2_sr = 0.0F;  ///< blackbody at their temperature
   };
-  /// What leaves the surface.
+  /// Parts of the light that leaves the surface.
   struct Parts {
     float emissivity_frac = 0.0F;
     float diffuse_frac = 0.0F;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "emit/config/slab_modes.hpp"
+#include "emit/scene/gloss_optics.hpp"
 #include "resolve.hpp"
 
 namespace emit::config {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "emit/scene/gloss.hpp"
+#include "emit/scene/gloss_optics.hpp"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,6 @@
 
 #include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
-#include "emit/scene/scene_desc.hpp"
 
 namespace emit::scene {
 namespace {
@@ -60,9 +59,8 @@ physics::LobeCurve interface_reflectance_frac(const Gloss& gloss, const physics:
   physics::LobeCurve out{};
   for (std::size_t i = 0; i < physics::kLobeNodes; ++i) {
     const double cosine = physics::lobe_cosine(i);
-    out[i] = constants.empty()
-                 ? by_angle_frac(gloss, cosine)
-                 : physics::band_reflectance_frac(constants, band, source, cosine);
+    out[i] = constants.empty() ? by_angle_frac(gloss, cosine)
+                               : physics::band_reflectance_frac(constants, band, source, cosine);
   }
   return out;
 }
@@ -118,8 +116,8 @@ physics::Result<void> check_emissivities(const Material& material,
           *listed, band.name, most));
     }
   }
-  const double most = 1.0 - physics::hemispherical_mean(interface_reflectance_frac(
-                                *material.gloss, kThermal, kSurface));
+  const double most = 1.0 - physics::hemispherical_mean(
+                                interface_reflectance_frac(*material.gloss, kThermal, kSurface));
   if (material.emissivity_frac > most + kHemisphericalSlackFrac) {
     return fail(fmt::format(
         "'emissivity_frac' of {:.3f}, which the heat balance uses, is more than the interface of "

@@ -152,7 +152,7 @@ vec2 leaving_w_m2_sr(uint band, Seen seen, float incoming, inout bool clamped) {
 }
 
 #ifdef EMIT_LOBES
-// What all bands share of the lobe of a pixel; block 0 where the surface is not glossy.
+// Finds what all bands share of the lobe of a pixel. The block is 0 where the surface is not glossy.
 LobePixel lobe_of(ivec2 px, Seen seen, bool surface) {
   int block = surface ? int(EMIT_LOBE_TABLE(int(seen.material))) : 0;
   LobePixel none;

@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include <glm/geometric.hpp>
 #include <glm/ext/vector_double3.hpp>
+#include <glm/geometric.hpp>
 
 #include "emit/physics/constants.hpp"
 #include "emit/physics/sun.hpp"
@@ -36,11 +36,14 @@ double over_hemisphere(const Function& function, int rings = 700, int sectors = 
   return sum * 2.0 * kPi / (double{1} * rings * sectors);
 }
 
-glm::dvec3 view_at(double cosine) { return {std::sqrt(1.0 - cosine * cosine), 0.0, cosine}; }
+glm::dvec3 view_at(double cosine) {
+  return {std::sqrt(1.0 - cosine * cosine), 0.0, cosine};
+}
 
 /// Smith's share for Gaussian slopes and for GGX, from Lambda's integral over slopes.
 double smith_by_slopes(const Facets& facets, double cosine) {
-  // 1 / (1 + Lambda) = cosine / int max(0, cosine - s sine) p(s) ds, with p the slopes along a line.
+  // 1 / (1 + Lambda) = cosine / int max(0, cosine - s sine) p(s) ds, with p the slopes along a
+  // line.
   const double sine = std::sqrt(1.0 - cosine * cosine);
   double seen = 0.0;
   constexpr int kSteps = 40000;
@@ -102,8 +105,10 @@ TEST(Facets, LobeHoldsWhatItsDirectionsReflect) {
           return part;
         });
         mean *= 2.0 * kPi / (700.0 * 350.0) / total;
-        EXPECT_NEAR(lobe.lobe_frac[node], total, 2e-3 * total + 2e-4) << facets.slope << ' ' << node;
-        EXPECT_NEAR(lobe.forward_ratio[node] * view.x, -mean.x, 4e-3) << facets.slope << ' ' << node;
+        EXPECT_NEAR(lobe.lobe_frac[node], total, 2e-3 * total + 2e-4)
+            << facets.slope << ' ' << node;
+        EXPECT_NEAR(lobe.forward_ratio[node] * view.x, -mean.x, 4e-3)
+            << facets.slope << ' ' << node;
         EXPECT_NEAR(lobe.upward[node], mean.z, 4e-3) << facets.slope << ' ' << node;
         EXPECT_LE(lobe.lobe_frac[node], 1.0);
       }
@@ -115,7 +120,8 @@ TEST(Facets, CloseTheEnergy) {
   for (const Facets& facets : kFacets) {
     const LobeCurve mirror = curve_of([](double) { return 1.0; });
     const Lobe white = make_lobe(facets, {mirror, mirror, 1.0, 1.0});
-    const LobeCurve glass = curve_of([](double c) { return fresnel_reflectance_frac(1.5, 0.0, c); });
+    const LobeCurve glass =
+        curve_of([](double c) { return fresnel_reflectance_frac(1.5, 0.0, c); });
     const Lobe paint = make_lobe(facets, {glass, glass, 0.8, 0.7});
     for (std::size_t i = 0; i < kLobeNodes; ++i) {
       // A mirror of any roughness takes nothing and gives everything back.
@@ -151,8 +157,8 @@ TEST(Facets, GlintSpreadsTheDiscOfTheSun) {
       for (int k = -40; k <= 40; ++k) {
         if (i * i + k * k > 1600) continue;
         const glm::dvec3 up(std::cos(0.6), 0.0, std::sin(0.6));
-        const glm::dvec3 point = glm::normalize(sun + kSunSemiAngleRad / 40.0 *
-                                                          (double{1} * i * up + glm::dvec3(0.0, k, 0.0)));
+        const glm::dvec3 point = glm::normalize(
+            sun + kSunSemiAngleRad / 40.0 * (double{1} * i * up + glm::dvec3(0.0, k, 0.0)));
         const glm::dvec3 half = glm::normalize(view + point);
         mean += glint_per_sr(facets, {view.z, point.z, half.z, glm::dot(half, view)}, 1e-9);
         ++count;
@@ -160,15 +166,16 @@ TEST(Facets, GlintSpreadsTheDiscOfTheSun) {
     }
     mean /= count;
     const glm::dvec3 half = glm::normalize(view + sun);
-    EXPECT_NEAR(glint_per_sr(facets, {view.z, sun.z, half.z, glm::dot(half, view)},
-                             kSunSemiAngleRad),
-                mean, 0.02 * mean)
+    EXPECT_NEAR(
+        glint_per_sr(facets, {view.z, sun.z, half.z, glm::dot(half, view)}, kSunSemiAngleRad), mean,
+        0.02 * mean)
         << off_rad;
   }
 }
 
 TEST(Facets, GlintOfAMirrorIsTheDisc) {
-  const double peak = glint_per_sr({FacetSlopes::ggx, 1e-5}, {0.8, 0.8, 1.0, 0.8}, kSunSemiAngleRad);
+  const double peak =
+      glint_per_sr({FacetSlopes::ggx, 1e-5}, {0.8, 0.8, 1.0, 0.8}, kSunSemiAngleRad);
   EXPECT_NEAR(peak * kPi * std::pow(std::sin(kSunSemiAngleRad), 2), 1.0, 0.01);
 }
 
@@ -182,12 +189,12 @@ TEST(Facets, SeaGlintIsThatOfCoxAndMunk) {
       const glm::dvec3 view = view_at(std::cos(zenith));
       const glm::dvec3 half = glm::normalize(view + sun);
       const double tan2 = (1.0 - half.z * half.z) / (half.z * half.z);
-      const double expected = std::exp(-tan2 / variance) / (kPi * variance) /
-                              (4.0 * view.z * std::pow(half.z, 4));
+      const double expected =
+          std::exp(-tan2 / variance) / (kPi * variance) / (4.0 * view.z * std::pow(half.z, 4));
       if (expected < 1e-3) continue;
-      EXPECT_NEAR(glint_per_sr(sea, {view.z, sun.z, half.z, glm::dot(half, view)},
-                               kSunSemiAngleRad),
-                  expected, 0.02 * expected)
+      EXPECT_NEAR(
+          glint_per_sr(sea, {view.z, sun.z, half.z, glm::dot(half, view)}, kSunSemiAngleRad),
+          expected, 0.02 * expected)
           << wind_m_s << ' ' << zenith;
     }
   }
@@ -206,9 +213,9 @@ TEST(Facets, SeaEmissivityIsThatOfItsVisibleFacets) {
     const Facets facets{FacetSlopes::gaussian, std::sqrt(2.0) * sigma};
     const Lobe sea = make_lobe(facets, {reflectance, reflectance, 1.0, 1.0});
     for (const double zenith_deg : {0.0, 40.0, 60.0, 70.0, 80.0}) {
-      // Mean over slopes, weighted by the projected area that faces the viewer (Masuda et al. 1988).
-      // What facets send to others adds to it, as Wu and Smith (1997) have it; others are black
-      // here.
+      // Mean over slopes, weighted by the projected area that faces the viewer (Masuda et al.
+      // 1988). What facets send to others adds to it, as Wu and Smith (1997) have it; others are
+      // black here.
       const glm::dvec3 view = view_at(std::cos(zenith_deg * kDegree));
       double emitted = 0.0;
       double caught = 0.0;
@@ -224,10 +231,10 @@ TEST(Facets, SeaEmissivityIsThatOfItsVisibleFacets) {
           const double weight = seen * std::exp(-0.5 * (x * x + y * y) / (sigma * sigma));
           const double facet_cosine = seen / glm::length(up);
           const double to_z = 2.0 * facet_cosine / glm::length(up) - view.z;
-          const double out = to_z <= 0.0 ? 0.0
-                                         : 1.0 / (1.0 + unmasked_frac(facets, view.z) *
-                                                            (1.0 / unmasked_frac(facets, to_z) -
-                                                             1.0));
+          const double out = to_z <= 0.0
+                                 ? 0.0
+                                 : 1.0 / (1.0 + unmasked_frac(facets, view.z) *
+                                                    (1.0 / unmasked_frac(facets, to_z) - 1.0));
           emitted += weight * (1.0 - fresnel(facet_cosine));
           caught += weight * fresnel(facet_cosine) * (1.0 - out);
           area += weight;

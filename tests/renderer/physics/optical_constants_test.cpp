@@ -24,8 +24,12 @@ double by_complex_angle(double n, double k, double cosine) {
 }
 
 TEST(OpticalConstants, FresnelMeetsTheComplexFormula) {
-  for (const auto& [n, k] : std::vector<std::pair<double, double>>{
-           {1.33, 0.0}, {1.153, 0.0968}, {1.5, 0.0}, {0.684, 0.543}, {1.209, 1.232}, {20.0, 40.0}}) {
+  for (const auto& [n, k] : std::vector<std::pair<double, double>>{{1.33, 0.0},
+                                                                   {1.153, 0.0968},
+                                                                   {1.5, 0.0},
+                                                                   {0.684, 0.543},
+                                                                   {1.209, 1.232},
+                                                                   {20.0, 40.0}}) {
     for (int i = 0; i <= 90; i += 5) {
       const double cosine = std::cos(i * kDegree);
       EXPECT_NEAR(fresnel_reflectance_frac(n, k, cosine), by_complex_angle(n, k, cosine), 1e-12)
@@ -57,7 +61,8 @@ TEST(OpticalConstants, TablesAreSoundAndHoldTheirSources) {
   EXPECT_EQ(constants_at(water, 10.0).refractive_index, 1.218);
   EXPECT_EQ(constants_at(water, 11.0).extinction_index, 0.0968);
   EXPECT_EQ(constants_at(water, 4.0).refractive_index, 1.351);
-  EXPECT_EQ(constants_at(optical_constants(IndexTable::window_glass), 10.0).refractive_index, 1.707);
+  EXPECT_EQ(constants_at(optical_constants(IndexTable::window_glass), 10.0).refractive_index,
+            1.707);
   EXPECT_EQ(constants_at(water, 1.0).refractive_index, 1.306) << "the ends are held";
 }
 

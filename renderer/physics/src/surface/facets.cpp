@@ -106,8 +106,7 @@ Lobe make_lobe(const Facets& facets, const FacetOptics& optics) {
         if (!(towards > 0.0)) continue;
         const double seen = towards * slope.weight;
         weights += seen;
-        const double length =
-            std::sqrt(1.0 + lean * lean + slope.across * slope.across);
+        const double length = std::sqrt(1.0 + lean * lean + slope.across * slope.across);
         const double facet_cosine = std::min(towards / length, 1.0);
         const double to_x = 2.0 * facet_cosine * (-lean / length) - sine;
         const double to_z = 2.0 * facet_cosine / length - cosine;
@@ -127,7 +126,7 @@ Lobe make_lobe(const Facets& facets, const FacetOptics& optics) {
     escape[node] /= weights;
     once[node] /= weights;
   }
-  // What facets send to each other comes out after further reflections.
+  // Light that facets send to each other comes out after further reflections.
   const double mean_escape = hemispherical_mean(escape);
   const double mean_reflectance = hemispherical_mean(optics.reflectance_frac);
   const double several_frac = mean_reflectance * mean_reflectance * mean_escape /

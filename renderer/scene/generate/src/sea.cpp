@@ -22,7 +22,12 @@ Scene ship() {
   MeshBuilder b("ship");
   // Hull, from 2.5 m below the water line to the deck.
   b.material("vehicle_grey");
-  b.prism({{-30.0, -4.0}, {15.0, -4.5}, {24.0, -2.8}, {30.0, 0.0}, {24.0, 2.8}, {15.0, 4.5},
+  b.prism({{-30.0, -4.0},
+           {15.0, -4.5},
+           {24.0, -2.8},
+           {30.0, 0.0},
+           {24.0, 2.8},
+           {15.0, 4.5},
            {-30.0, 4.0}},
           -2.5, 3.6);
   // Deck house with a bridge, mast and a gun.
@@ -35,8 +40,8 @@ Scene ship() {
   b.tube({18.0, 0.0, 3.6}, {18.0, 0.0, 5.4}, 1.5, 1.2, 20);
   b.tube({18.5, 0.0, 5.0}, {23.5, 0.0, 5.6}, 0.12, 0.12, 10);
   // Funnel.
-  b.material("painted_metal").box({-13.0, -1.8, 6.4}, {-8.0, 1.8, 9.6},
-                                  MeshBuilder::kTop | MeshBuilder::kSides);
+  b.material("painted_metal")
+      .box({-13.0, -1.8, 6.4}, {-8.0, 1.8, 9.6}, MeshBuilder::kTop | MeshBuilder::kSides);
   // Boat on the after deck.
   b.material("rubber").lathe_x({{-26.0, 0.0}, {-25.8, 0.5}, {-21.0, 0.5}, {-19.5, 0.0}},
                                {0.0, 0.0, 4.2}, 16);

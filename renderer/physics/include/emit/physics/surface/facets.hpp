@@ -55,7 +55,8 @@ using LobeCurve = std::array<double, kLobeNodes>;
 }
 /// Returns a curve between its nodes, linear in the root of the cosine.
 [[nodiscard]] inline double lobe_at(const LobeCurve& curve, double cosine) noexcept {
-  const double place = (kLobeNodes - 1) * std::sqrt(cosine > 0.0 ? (cosine < 1.0 ? cosine : 1.0) : 0.0);
+  const double place =
+      (kLobeNodes - 1) * std::sqrt(cosine > 0.0 ? (cosine < 1.0 ? cosine : 1.0) : 0.0);
   const auto node = place < kLobeNodes - 2 ? static_cast<std::size_t>(place) : kLobeNodes - 2;
   return std::lerp(curve[node], curve[node + 1], place - static_cast<double>(node));
 }
