@@ -203,6 +203,23 @@ TEST(Gloss, UnderASkyOfItsTemperatureEverySurfaceIsABlackbody) {
   }
 }
 
+TEST(Gloss, ASmallTargetOfTheSkysTemperatureIsABlackbodyToo) {
+  constexpr double kKelvin = 285.0;
+  auto scenario = held_scenario(write_quads("target", box({-2.0, -2.0, 0.0}, {2.0, 2.0, 2.0})),
+                                kKelvin, gloss_of(1.5, 0.1));
+  scenario.objects[0].entity_id = 7;
+  scenario.sensor.fov_h_rad = 0.35;
+  set_even_sky(scenario, kKelvin);
+  const Frame frame = shot(scenario, look({150.0, -120.0, 30.0}, {0.0, 0.0, 5.0}));
+  ASSERT_EQ(frame.radiance.size(), kBands.size());
+  EXPECT_TRUE(std::ranges::any_of(frame.depth_m, [](float m) { return std::isfinite(m); }));
+  for (std::size_t b = 0; b < kBands.size(); ++b) {
+    for (const float radiance : frame.radiance[b]) {
+      ASSERT_NEAR(radiance / black(kBands[b], kKelvin), 1.0, 1e-4) << kBands[b].name;
+    }
+  }
+}
+
 /// Fresnel's reflectance without absorption, by the angle of refraction.
 double fresnel(double index, double cosine) {
   const double inside = std::sqrt(1.0 - (1.0 - cosine * cosine) / (index * index));
