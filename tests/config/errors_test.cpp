@@ -323,7 +323,7 @@ const std::vector<Case>& cases() {
       {"gloss_slope_at_sea",
        material(
            "prescribed_k = 400\ngloss = { index = \"water\", sea = true, facet_slope = 0.1 }\n"),
-       "s.toml:7:53: 'facet_slope' has no effect: with 'sea' the wind gives the slopes"},
+       "s.toml:7:54: 'facet_slope' has no effect: with 'sea' the wind gives the slopes"},
       {"gloss_below_the_emissivity",
        material("prescribed_k = 400\ngloss = { wavelength_um = [10], refractive_index = [3], "
                 "extinction_index = [0] }\n"),

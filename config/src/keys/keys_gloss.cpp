@@ -64,9 +64,11 @@ const KeyTable<Gloss>& gloss_keys() {
       number<Gloss>("lobe_frac", "", between(0, 1), EMIT_FIELD(lobe_frac),
                     "Share of what the interface reflects that goes into the lobe. The rest is "
                     "diffuse."),
-      number<Gloss>("facet_slope", "", between(0.001, 1), EMIT_FIELD(facet_slope),
-                    "Width of the slopes of the facets (GGX): 0.002 glass, 0.02 car paint, 0.3 "
-                    "wet asphalt."),
+      written_if(
+          [](const Gloss& in) { return !in.sea; },
+          number<Gloss>("facet_slope", "", between(0.001, 1), EMIT_FIELD(facet_slope),
+                        "Width of the slopes of the facets (GGX): 0.002 glass, 0.02 car paint, 0.3 "
+                        "wet asphalt.")),
       boolean<Gloss>("sea", EMIT_FIELD(sea),
                      "`true`: the facets are wind waves with the slopes of Cox and Munk."),
       number<Gloss>("sea_wind_m_s", "m/s", between(0, 20), EMIT_FIELD(sea_wind_m_s),
