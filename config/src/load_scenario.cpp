@@ -271,6 +271,21 @@ void warn_of_default_place_and_time(const Node& root, const Node& place, Scenari
   }
 }
 
+/// Reports parts whose material varies: their heat belongs to its mean alone.
+void check_parts_vary_not(const Node& root, const ScenarioDesc& scenario,
+                          Diagnostics& diagnostics) {
+  for (const scene::ObjectDesc& object : scenario.objects) {
+    for (const scene::PartDesc& part : object.parts) {
+      const auto material =
+          std::ranges::find(scenario.materials, part.material, &scene::Material::name);
+      if (material == scenario.materials.end() || !scene::varies_in_heat(*material)) continue;
+      diagnostics.add(key_location(root, "clutter"),
+                      fmt::format("material '{}' varies: part '{}' of object '{}' cannot have it",
+                                  material->name, part.name, object.name));
+    }
+  }
+}
+
 /// Smoke drifts with the wind, whose direction has to be known.
 void warn_of_smoke_without_wind(ScenarioDesc& scenario) {
   if (scenario.gas.smokes.empty()) return;
@@ -382,6 +397,7 @@ Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
   scenario.atmosphere = resolve_atmosphere(root, scenario, diagnostics);
 
   scenario.materials = resolve_materials(pool.members[0].value.items, known, diagnostics);
+  resolve_clutter(root, scenario.thermal, known, scenario.materials, diagnostics);
   complete_band_emissivities(scenario.bands, scenario.materials);
   // The renderer gets only bands that a channel shows, and emissivities in those bands.
   std::vector<std::string> handed_over = known_band_names({});
@@ -399,6 +415,7 @@ Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
   scenario.sensor = resolve_sensor(root, diagnostics);
   scenario.objects =
       resolve_objects(root, scenario.materials, options.require_scene_files, diagnostics);
+  check_parts_vary_not(root, scenario, diagnostics);
   scenario.contacts = resolve_contacts(root, scenario.objects, scenario.materials, diagnostics);
   scenario.gas = resolve_gas(root, scenario.objects, known, diagnostics);
   warn_of_smoke_without_wind(scenario);

@@ -37,7 +37,7 @@ done
 if [[ -n $out ]]; then out=$(realpath -m "$out"); fi
 cd "$(dirname "$0")/../.."
 out=${out:-$PWD/out/bench}
-known=(paper error-vs-time scaling crowd turn live budget thermal-truth convergence subpixel gas uncertainty stability stream isolation)
+known=(paper error-vs-time scaling crowd turn live budget thermal-truth convergence subpixel gas clutter uncertainty stability stream isolation)
 if ((${#suites[@]} == 0)); then suites=("${known[@]}"); fi
 for suite in "${suites[@]}"; do
   if [[ " ${known[*]} " != *" $suite "* ]]; then
@@ -58,6 +58,7 @@ arguments() { # of a suite, when quick
     thermal-truth) echo "--width 64 --height 48 --steps 9" ;;
     subpixel) echo "--phases 10 --pairs 15" ;;
     gas) echo "--pairs 15 --set thermal.tolerance_k=50" ;;
+    clutter) echo "--scenario box --pairs 15 --set thermal.tolerance_k=50 --set thermal.steps=3" ;;
     uncertainty) echo "box --set thermal.tolerance_k=10 --set thermal.steps=9" ;;
     stability) echo "--cases 100000 --part equilibrium" ;;
     stream) echo "--frames 300 --repeats 1" ;;

@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <glm/gtc/matrix_access.hpp>
 #include <limits>
 #include <utility>
 
@@ -33,6 +35,21 @@ DrawRecord record_of(const glm::dmat4& clip_from_relworld, const glm::dmat4& rel
   record.params.moves = stand != nullptr ? 1U : 0U;
   record.params.moved_frac = stand != nullptr ? stand->moved_frac : 0.0F;
   return record;
+}
+
+/// Lets a draw look up the field of its material. The field lies in the axes of the body of an
+/// entity, and in those of the world for everything else. Whole tiles are left out, so that places
+/// far from the origin keep their resolution.
+void set_clutter(const DrawnClutter& clutter, const glm::dmat4& place_from_mesh,
+                 gpu::DrawParams& params) noexcept {
+  params.field = clutter.field;
+  params.twins = clutter.heat ? 1.0F : 0.0F;
+  if (clutter.field == 0) return;
+  for (glm::length_t row = 0; row < 3; ++row) {
+    const glm::dvec4 tiles = clutter.tiles_per_m * glm::row(place_from_mesh, row);
+    const double part = tiles.w - std::floor(tiles.w);
+    params.tile_row[row] = glm::vec4(glm::dvec4(tiles.x, tiles.y, tiles.z, part));
+  }
 }
 
 /// Offset of an index in the index buffer. GL takes the number of bytes as a pointer.
@@ -74,8 +91,12 @@ scene::Aabb shifted(const scene::Aabb& box, const glm::dvec3& by_m) noexcept {
 
 DrawLists::DrawLists(const SceneBuffers& scene, std::span<const std::int32_t> history_of_object,
                      std::uint32_t max_passes, TriangleCull* cull,
-                     std::vector<EntityAnchor> anchors)
-    : scene_(scene), cull_(cull), max_passes_(max_passes), anchors_(std::move(anchors)) {
+                     std::vector<EntityAnchor> anchors, std::span<const DrawnClutter> clutter)
+    : scene_(scene),
+      cull_(cull),
+      max_passes_(max_passes),
+      anchors_(std::move(anchors)),
+      clutter_(clutter.begin(), clutter.end()) {
   const auto instances = scene.instances();
   std::size_t view_ranges = 0;
   std::size_t submesh_instances = 0;
@@ -254,6 +275,12 @@ void DrawLists::add_draw(std::uint32_t instance, const SceneBuffers::DrawRange& 
   const EntityStand* stand = entity >= 0 ? &stands_[static_cast<std::size_t>(entity)] : nullptr;
   records_.push_back(record_of(view.clip_from_relworld, matrix, scene_.instances()[instance].object,
                                submesh.material, stand));
+  if (!clutter_.empty()) {
+    const scene::Instance& placed = scene_.instances()[instance];
+    set_clutter(clutter_[submesh.material],
+                entity >= 0 ? placed.body_from_mesh : placed.world_from_mesh,
+                records_.back().params);
+  }
   add_ranges(instance, submesh, ClusterView(view, matrix, limits),
              records_.back().params.clip_from_mesh, cull);
   const auto count = static_cast<std::uint32_t>(view_ranges_.index_count.size()) - first;

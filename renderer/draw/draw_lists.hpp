@@ -34,6 +34,13 @@ struct LightCommand {
   std::uint32_t first_record = 0;
   std::uint32_t count = 0;
 };
+/// How draws of a material use the field of its clutter.
+struct DrawnClutter {
+  std::uint32_t field = 0;  ///< 1 + number of the field; 0: the material does not vary
+  double tiles_per_m = 0.0;
+  bool heat = false;  ///< its samples have twins
+};
+
 /// Draws of one frame. For each pass it holds the draws that culling by boxes and clusters leaves.
 /// Owner: DrawnScene. Thread: the one of the renderer. Real time: the constructor allocates the
 /// capacity for the worst case; all other functions are RT-safe.
@@ -43,10 +50,12 @@ class DrawLists {
   /// or -1 for a static object. `max_passes` is the largest number of shadow passes (steps x
   /// cascades) of a frame. `cull` is null or the object that the buffers were made with. The lists
   /// keep references to `scene` and `cull`. `anchors` are the poses, by entity, for which the views
-  /// of the samples were found; they are empty where vertices are no samples.
+  /// of the samples were found; they are empty where vertices are no samples. `clutter` is by
+  /// material; empty: none varies.
   /// @pre history_of_object has an entry for the object of every instance.
   DrawLists(const SceneBuffers& scene, std::span<const std::int32_t> history_of_object,
-            std::uint32_t max_passes, TriangleCull* cull, std::vector<EntityAnchor> anchors = {});
+            std::uint32_t max_passes, TriangleCull* cull, std::vector<EntityAnchor> anchors = {},
+            std::span<const DrawnClutter> clutter = {});
 
   /// Starts a frame. Places all instances at `sim_time_ns` around a camera at `camera_world_m`.
   /// @pre `entities` has an entry for every entity of the constructor.
@@ -156,6 +165,7 @@ class DrawLists {
   std::size_t window_records_ = 0;          ///< entries of records_ that windows may use
   scene::Aabb static_bounds_world_;
   std::vector<DrawRecord> records_;
+  std::vector<DrawnClutter> clutter_;  ///< by material; empty: none varies
   std::vector<LightRecord> light_records_;
   std::vector<ViewDraw> view_draws_;
   ViewRanges view_ranges_;

@@ -13,8 +13,18 @@
 /// Thread: any.  Real time: setup only.
 namespace emit::renderer {
 
-/// Returns the networks of all simulated materials and, as the last entry, of the surroundings. The
-/// vector is empty for emit2014.
+/// Magnitude of the clutter's field at which twins of a material are solved, in standard deviations.
+inline constexpr double kTwinSd = 1.5;
+
+/// Returns a material with clutter as it is where the field has the value `sd` (physics.md eq. 56).
+/// Its thermal inertia changes at the same diffusivity: conductivities and heat capacities of all
+/// layers by one factor.
+/// @pre material.clutter
+[[nodiscard]] scene::Material material_at(const scene::Material& material, double sd);
+
+/// Returns the networks of all simulated materials, then of the twins of those with clutter that
+/// changes temperatures and, as the last entry, of the surroundings. The vector is empty for
+/// emit2014.
 /// Errors (config) name the material.
 [[nodiscard]] physics::Result<std::vector<FosterMaterial>> build_foster_materials(
     const scene::ScenarioDesc& scenario, std::span<const scene::Material> materials);

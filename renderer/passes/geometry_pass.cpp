@@ -93,8 +93,12 @@ physics::Result<GeometryPass> GeometryPass::create(const gl::EglContext& context
     if (setup.seen) defines.push_back({"EMIT_SEEN", "1"});
   }
   if (objects) defines.push_back({"EMIT_OBJECTS", "1"});
+  if (setup.clutter) defines.push_back({"EMIT_CLUTTER", "1"});
   const bool normals = sampled && setup.normal;
-  if (normals) defines.push_back({"EMIT_NORMAL", objects ? "3" : "2"});
+  if (normals) {
+    const int place = 2 + (objects ? 1 : 0) + (setup.clutter ? 1 : 0);
+    defines.push_back({"EMIT_NORMAL", fmt::format("{}", place)});
+  }
   if (setup.shade == Shade::of_entities) defines.push_back({"EMIT_SHADE", "1"});
   auto program = gl::Program::graphics("passes/geometry.vert", "passes/geometry.frag", defines);
   if (!program) return tl::unexpected(std::move(program.error()));
@@ -115,14 +119,23 @@ physics::Result<GeometryPass> GeometryPass::create(const gl::EglContext& context
       pass.ids_ = gl::Texture(GL_R16UI, width, height);
       glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT2, pass.ids_.id(), 0);
     }
+    GLsizei count = objects ? 3 : 2;
+    constexpr std::array<GLenum, 5> kTargets{GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1,
+                                             GL_COLOR_ATTACHMENT2, GL_COLOR_ATTACHMENT3,
+                                             GL_COLOR_ATTACHMENT4};
+    if (setup.clutter) {
+      pass.clutter_ = gl::Texture(GL_RGBA32UI, width, height);
+      glNamedFramebufferTexture(id, kTargets[static_cast<std::size_t>(count)], pass.clutter_.id(),
+                                0);
+      ++count;
+    }
     if (normals) {
       pass.normal_ = gl::Texture(GL_RG16_SNORM, width, height);
-      glNamedFramebufferTexture(id, objects ? GL_COLOR_ATTACHMENT3 : GL_COLOR_ATTACHMENT2,
-                                pass.normal_.id(), 0);
+      glNamedFramebufferTexture(id, kTargets[static_cast<std::size_t>(count)], pass.normal_.id(),
+                                0);
+      ++count;
     }
-    const GLenum targets[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1, GL_COLOR_ATTACHMENT2,
-                              GL_COLOR_ATTACHMENT3};
-    glNamedFramebufferDrawBuffers(id, 2 + (objects ? 1 : 0) + (normals ? 1 : 0), targets);
+    glNamedFramebufferDrawBuffers(id, count, kTargets.data());
   } else {
     pass.depth_m_ = gl::Texture(GL_R32F, width, height);
     pass.normal_ = gl::Texture(GL_RG16_SNORM, width, height);
@@ -195,6 +208,7 @@ void GeometryPass::bind_textures() const noexcept {
     glBindImageTexture(EMIT_IMG_SURFACE, surface_.id(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RG32UI);
     if (ids_.id() != 0) ids_.bind(EMIT_TEX_IDS);
     if (normal_.id() != 0) normal_.bind(EMIT_TEX_NORMAL);
+    if (clutter_.id() != 0) clutter_.bind(EMIT_TEX_CLUTTER_PIXELS);
     return;
   }
   depth_m_.bind(EMIT_TEX_DEPTH);

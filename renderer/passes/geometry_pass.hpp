@@ -38,6 +38,7 @@ class GeometryPass {
     std::uint32_t bands = 1;  ///< of the incoming radiance that samples have
     bool normal = false;      ///< samples have normals too, because something is glossy
     bool seen = false;        ///< vertices of samples have SceneVertexArrays::read_seen
+    bool clutter = false;     ///< some materials vary: vertices have SceneVertexArrays::read_twins
   };
   /// Compiles the pass and makes the geometry buffer for images of up to the size of `setup`.
   /// Errors: gpu (names the shader or the render target). @pre 1 <= setup.bands <= EMIT_MAX_BANDS
@@ -67,6 +68,7 @@ class GeometryPass {
   gl::Texture ids_;
   gl::Texture surface_;   ///< state of samples as passes/surface_texel.glsl packs it
   gl::Texture incoming_;  ///< radiance that arrives at samples, by band
+  gl::Texture clutter_;   ///< place in the clutter's field, see passes/clutter.glsl
   gl::Texture depth_buffer_;
   gl::Framebuffer framebuffer_;
   bool sampled_ = false;

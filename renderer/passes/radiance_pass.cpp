@@ -28,6 +28,7 @@ physics::Result<RadiancePass> RadiancePass::create(const scene::ThermalOptions& 
   if (content.first_lobe != 0) {
     defines.push_back({"EMIT_LOBES", fmt::format("{}", content.first_lobe)});
   }
+  if (content.clutter) defines.push_back({"EMIT_CLUTTER", "1"});
   if (options.model == scene::ThermalModel::foster) defines.push_back({"EMIT_FOSTER", "1"});
   if (options.method == scene::ThermalMethod::cached) defines.push_back({"EMIT_CACHED", "1"});
   auto program = gl::Program::compute("passes/radiance.comp", defines);

@@ -19,6 +19,7 @@ struct RadianceContent {
   /// Index of the first number of the lobes in the buffer of the tables; 0: nothing is glossy.
   std::uint32_t first_lobe = 0;
   std::uint32_t outputs = 0;  ///< planes behind those of the bands, EMIT_OUTPUT_*
+  bool clutter = false;       ///< some materials vary from place to place
 };
 
 /// Radiance of every pixel in all bands (part 5 of the paper). See passes/radiance.comp.

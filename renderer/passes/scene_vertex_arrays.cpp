@@ -61,6 +61,22 @@ void SceneVertexArrays::read_nodes(const gl::Buffer& before,
   read(EMIT_ATTR_NODE_AFTER, 4, after);
 }
 
+void SceneVertexArrays::read_twins(const gl::Buffer& before, const gl::Buffer& after,
+                                   std::size_t drawn) const noexcept {
+  const auto read = [this](GLuint attribute, GLuint binding, const gl::Buffer& node,
+                           std::size_t first) {
+    glVertexArrayVertexBuffer(view_.id(), binding, node.id(),
+                              static_cast<GLintptr>(first * 2 * sizeof(float)), 2 * sizeof(float));
+    glVertexArrayAttribFormat(view_.id(), attribute, 1, GL_FLOAT, GL_FALSE, 0);
+    glVertexArrayAttribBinding(view_.id(), attribute, binding);
+    glEnableVertexArrayAttrib(view_.id(), attribute);
+  };
+  read(EMIT_ATTR_LOW_BEFORE, 9, before, drawn);
+  read(EMIT_ATTR_LOW_AFTER, 10, after, drawn);
+  read(EMIT_ATTR_HIGH_BEFORE, 11, before, 2 * drawn);
+  read(EMIT_ATTR_HIGH_AFTER, 12, after, 2 * drawn);
+}
+
 void SceneVertexArrays::read_seen(const gl::Buffer& before, const gl::Buffer& after,
                                   std::uint32_t bands) const noexcept {
   const auto read = [&](GLuint attribute, GLuint binding, const gl::Buffer& node) {

@@ -22,6 +22,10 @@ class SceneVertexArrays {
   /// same nodes: `bands` floats per vertex in each.
   void read_seen(const gl::Buffer& before, const gl::Buffer& after,
                  std::uint32_t bands) const noexcept;
+  /// Lets the camera's draws read the temperatures of twins from the buffers of read_nodes(): those
+  /// of the low twins from vertex `drawn` on, and those of the high ones from twice that.
+  void read_twins(const gl::Buffer& before, const gl::Buffer& after,
+                  std::size_t drawn) const noexcept;
   /// Sets the buffer that the camera's draws read the recent shade of entities from: one float per
   /// vertex.
   void read_shade(const gl::Buffer& shade) const noexcept;

@@ -32,6 +32,7 @@
 #include "passes/target_pass.hpp"
 #include "stages/band_model.hpp"
 #include "stages/cached_stage.hpp"
+#include "stages/clutter_fields.hpp"
 #include "stages/frame_setup.hpp"
 #include "stages/gas_model.hpp"
 #include "stages/per_frame_stage.hpp"
@@ -54,7 +55,7 @@ static_assert(EMIT_MAX_ATMOSPHERE_TERMS == limits::kMaxAtmosphereTerms);
 constexpr std::size_t kBlockAlignment = 256;
 /// Largest number of planes: radiance of all bands, temperature, depth, object, sun, sky, what
 /// arrives in all bands, material, coverage.
-constexpr std::size_t kMaxPlanes = 2 * EMIT_MAX_BANDS + 11;
+constexpr std::size_t kMaxPlanes = 2 * EMIT_MAX_BANDS + 14;
 
 /// Checks the limits of the renderer. Errors: config, naming the value and the limit.
 Result<void> check_limits(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
@@ -126,11 +127,14 @@ class GlRenderer final : public Renderer {
  public:
   GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext context,
              const scene::SceneGeometry& geometry, const OutputOptions& output, BandModel bands,
-             std::optional<GasModel> gas, FramePasses passes);
+             std::optional<GasModel> gas, ClutterFields clutter, FramePasses passes);
   /// Sets the thermal method, which reads history(). It is called before anything else.
   void set_stage(std::unique_ptr<ThermalStage> stage) { stage_ = std::move(stage); }
   [[nodiscard]] const SceneHistory& history() const noexcept { return history_; }
   [[nodiscard]] const BandModel& bands() const noexcept { return bands_; }
+  [[nodiscard]] std::span<const DrawnClutter> clutter() const noexcept {
+    return clutter_.empty() ? std::span<const DrawnClutter>() : clutter_.of_materials();
+  }
 
   std::size_t apply_entities(std::int64_t sim_time_ns,
                              std::span<const EntityUpdate> updates) noexcept override;
@@ -215,6 +219,7 @@ class GlRenderer final : public Renderer {
   std::vector<std::uint32_t> entity_ids_;
   BandModel bands_;
   std::optional<GasModel> gas_;
+  ClutterFields clutter_;
   FramePasses passes_;
   std::unique_ptr<ThermalStage> stage_;
   bool warm_ = false;  ///< the stage has been warmed up
@@ -241,7 +246,8 @@ class GlRenderer final : public Renderer {
 };
 
 /// Content that the radiance pass is compiled for.
-RadianceContent radiance_content(const BandModel& bands, const OutputOptions& output) {
+RadianceContent radiance_content(const BandModel& bands, bool clutter,
+                                 const OutputOptions& output) {
   return {.bands = static_cast<std::uint32_t>(bands.params().size()),
           .air_terms = bands.air_terms(),
           .air_table = bands.air_table(),
@@ -252,7 +258,8 @@ RadianceContent radiance_content(const BandModel& bands, const OutputOptions& ou
                      (output.depth ? EMIT_OUTPUT_DEPTH : 0U) |
                      (output.object ? EMIT_OUTPUT_OBJECT : 0U) |
                      (output.sun ? EMIT_OUTPUT_SUN : 0U) | (output.sky ? EMIT_OUTPUT_SKY : 0U) |
-                     (output.terms ? EMIT_OUTPUT_TERMS : 0U)};
+                     (output.terms ? EMIT_OUTPUT_TERMS : 0U),
+          .clutter = clutter};
 }
 
 /// True when some object of the scenario is an entity.
@@ -265,7 +272,7 @@ bool has_entities(const scene::ScenarioDesc& scenario) {
 std::size_t surface_planes(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
   return scenario.bands.size() + (output.temperature ? 1U : 0U) + (output.depth ? 1U : 0U) +
          (output.object ? 1U : 0U) + (output.sun ? 1U : 0U) + (output.sky ? 1U : 0U) +
-         (output.terms ? scenario.bands.size() + 5 : 0U);
+         (output.terms ? scenario.bands.size() + 8 : 0U);
 }
 
 /// Number of planes of the output image.
@@ -282,7 +289,8 @@ std::size_t planes_bytes(const scene::ScenarioDesc& scenario, const OutputOption
 
 GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext context,
                        const scene::SceneGeometry& geometry, const OutputOptions& output,
-                       BandModel bands, std::optional<GasModel> gas, FramePasses passes)
+                       BandModel bands, std::optional<GasModel> gas, ClutterFields clutter,
+                       FramePasses passes)
     : scenario_(scenario),
       output_(output),
       context_(std::move(context)),
@@ -292,6 +300,7 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
       history_{Environment(scenario), {}, {}},
       bands_(std::move(bands)),
       gas_(std::move(gas)),
+      clutter_(std::move(clutter)),
       passes_(std::move(passes)),
       frame_buffer_(gl::Buffer::dynamic(sizeof(gpu::FrameParams))),
       band_buffer_(gl::Buffer::dynamic(EMIT_MAX_BANDS * sizeof(gpu::BandParams))),
@@ -332,6 +341,7 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
   frame_params_.near_m = static_cast<float>(scenario_.sensor.near_m);
   frame_params_.band_lut_nodes = bands_.nodes_per_band();
   frame_params_.first_emissivity = bands_.first_emissivity();
+  frame_params_.first_emissivity_sd = bands_.first_emissivity_sd();
   // Let the view of each slot refer to the planes in its memory.
   for (std::uint32_t slot = 0; slot < output_.slots; ++slot) {
     FrameView& view = views_[slot];
@@ -355,6 +365,9 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
     }
     if (output_.terms) {
       view.material = next_plane();
+      view.clutter_sd = next_plane();
+      view.clutter_k = next_plane();
+      view.clutter_variance_k2 = next_plane();
       for (std::span<const float>& plane_of_axis : view.normal) plane_of_axis = next_plane();
       view.glint_per_sr = next_plane();
     }
@@ -525,6 +538,8 @@ std::vector<RadianceTerms> GlRenderer::radiance_terms(const FrameView& view, con
   seen.to_viewer = -glm::normalize(glm::mat3(frame_params_.relworld_from_sensor) * ray);
   seen.to_sun = frame_params_.to_sun;
   seen.glint_per_sr = view.glint_per_sr[i];
+  seen.clutter_sd = view.clutter_sd[i];
+  seen.clutter_variance_k2 = view.clutter_variance_k2[i];
   std::vector<RadianceTerms> out;
   for (std::size_t b = 0; b < bands_.bands(); ++b) {
     out.push_back(bands_.terms(b, seen, view.incoming_w_m2_sr[b][i]));
@@ -565,6 +580,7 @@ void GlRenderer::bind_frame() const noexcept {
   output_buffer_.bind_storage(EMIT_BIND_OUTPUT, 0, stats_offset_);
   output_buffer_.bind_storage(EMIT_BIND_STATS, stats_offset_, sizeof(gpu::FrameStatsGpu));
   passes_.geometry.bind_textures();
+  if (!clutter_.empty()) clutter_.bind();
   stage_->bind();
 }
 
@@ -757,6 +773,9 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
   auto foster = build_foster_materials(scenario, geometry->materials);
   if (!foster) return tl::unexpected(std::move(foster.error()));
 
+  auto clutter = ClutterFields::build(geometry->materials);
+  if (!clutter) return tl::unexpected(std::move(clutter.error()));
+
   // Compile the passes that every method uses.
   const std::uint32_t width_px = scenario.sensor.width_px;
   const std::uint32_t height_px = scenario.sensor.height_px;
@@ -771,11 +790,12 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
                                                         : GeometryPass::Shade::none,
                                            .bands = static_cast<std::uint32_t>(bands->bands()),
                                            .normal = bands->first_lobe() != 0,
-                                           .seen = CachedStage::sees_in_band(scenario.thermal)};
+                                           .seen = CachedStage::sees_in_band(scenario.thermal),
+                                           .clutter = !clutter->empty()};
   auto geometry_pass = GeometryPass::create(*context, geometry_setup);
   if (!geometry_pass) return tl::unexpected(std::move(geometry_pass.error()));
-  auto radiance_pass =
-      RadiancePass::create(scenario.thermal, radiance_content(*bands, output), context->software());
+  auto radiance_pass = RadiancePass::create(
+      scenario.thermal, radiance_content(*bands, !clutter->empty(), output), context->software());
   if (!radiance_pass) return tl::unexpected(std::move(radiance_pass.error()));
   FramePasses passes{std::move(*geometry_pass), std::move(*radiance_pass), {}, {}, {}};
   std::optional<GasModel> gas;
@@ -806,14 +826,14 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
   }
 
   // Create the renderer, then the thermal method, which reads its history.
-  auto renderer =
-      std::make_unique<GlRenderer>(scenario, std::move(*context), *geometry, output,
-                                   std::move(*bands), std::move(gas), std::move(passes));
-  auto stage =
-      cached ? CachedStage::create(scenario, std::move(*geometry), std::move(*foster),
-                                   renderer->history(), renderer->bands(), renderer->software())
-             : PerFrameStage::create(scenario, std::move(*geometry), std::move(*foster),
-                                     renderer->history());
+  auto renderer = std::make_unique<GlRenderer>(scenario, std::move(*context), *geometry, output,
+                                               std::move(*bands), std::move(gas),
+                                               std::move(*clutter), std::move(passes));
+  auto stage = cached ? CachedStage::create(scenario, std::move(*geometry), std::move(*foster),
+                                            renderer->history(), renderer->bands(),
+                                            renderer->clutter(), renderer->software())
+                      : PerFrameStage::create(scenario, std::move(*geometry), std::move(*foster),
+                                              renderer->history());
   if (!stage) return tl::unexpected(std::move(stage.error()));
   renderer->set_stage(std::move(*stage));
   if (glGetError() != GL_NO_ERROR || !renderer->memory_mapped()) {

@@ -50,6 +50,19 @@ double band_emissivity_frac(const scene::Material& material, const std::string& 
   return material.emissivity_frac;
 }
 
+/// Returns c of L'' / L' = c / T^2 - 2 / T, for a blackbody at 300 K. For a narrow band where
+/// exp(c / T) is large, c is the second radiation constant over the wavelength (physics.md eq. 58).
+float curvature_k(const physics::BandRadianceLut& lut) {
+  constexpr double kAtK = 300.0;
+  constexpr double kStepK = 8.0;
+  const auto at = [&](double kelvin) {
+    return static_cast<double>(lut.lookup(static_cast<float>(kelvin)).radiance_w_m2_sr);
+  };
+  const double slope = (at(kAtK + kStepK) - at(kAtK - kStepK)) / (2.0 * kStepK);
+  const double bend = (at(kAtK + kStepK) - 2.0 * at(kAtK) + at(kAtK - kStepK)) / (kStepK * kStepK);
+  return static_cast<float>(kAtK * kAtK * (bend / slope + 2.0 / kAtK));
+}
+
 /// Sunlight in a band outside the atmosphere, normal to the sun at 1 au, W m-2: that of the air
 /// model's spectrum, or of a blackbody of the sun's disc where the model does not reach.
 double sun_outside_w_m2(const physics::Band& band) {
@@ -157,6 +170,7 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
       params.vertical_transmittance_frac =
           static_cast<float>(atmosphere->vertical_transmittance_frac);
     }
+    params.curvature_k = curvature_k(*lut);
     // Compute the constants of sun and sky.
     entry.sun_outside_w_m2 = sun_outside_w_m2(entry.band);
     entry.sky_frac = sky_frac(entry.vertical_transmittance_frac);
@@ -198,6 +212,18 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
                                        : std::optional<double>();
       model.tables_.push_back(static_cast<float>(
           glossy ? *glossy : band_emissivity_frac(materials[m], scenario.bands[b].name)));
+    }
+  }
+  // Append what clutter changes of them, if there is any.
+  const bool varies = std::ranges::any_of(
+      materials, [](const scene::Material& material) { return material.clutter.has_value(); });
+  model.first_emissivity_sd_ =
+      varies ? static_cast<std::uint32_t>(model.tables_.size()) : model.first_emissivity_;
+  for (std::size_t m = 0; varies && m < materials.size(); ++m) {
+    for (const scene::SpectralBand& band : scenario.bands) {
+      const std::optional<scene::Clutter>& clutter = materials[m].clutter;
+      model.tables_.push_back(
+          clutter ? static_cast<float>(scene::emissivity_sd_frac(*clutter, band.name)) : 0.0F);
     }
   }
   if (model.lobes_) {
@@ -424,6 +450,13 @@ RadianceTerms BandModel::terms(std::size_t band, const Seen& seen,
   out.path_w_m2_sr = way.path_w_m2_sr;
   // Split what leaves the surface.
   out.emissivity_frac = emissivity_frac(seen.material, band);
+  float emitting_k = seen.temperature_k;
+  if (first_emissivity_sd_ != first_emissivity_) {
+    out.emissivity_frac += static_cast<double>(
+        seen.clutter_sd * tables_[first_emissivity_sd_ + seen.material * entries_.size() + band]);
+    const float per_k = 1.0F / std::max(emitting_k, 1.0F);
+    emitting_k += 0.5F * seen.clutter_variance_k2 * (params.curvature_k * per_k - 2.0F) * per_k;
+  }
   const double reflected = (1.0 - out.emissivity_frac) * out.air_frac;
   physics::SkyByTilt sky{};
   for (std::size_t t = 0; t < physics::kSkyTilts; ++t) {
@@ -441,8 +474,7 @@ RadianceTerms BandModel::terms(std::size_t band, const Seen& seen,
     if (glossy) {
       const double diffuse_sky = seen.open_frac * physics::sky_at_tilt(sky, seen.normal.z);
       out.emissivity_frac = glossy->emissivity_frac;
-      out.emission_w_m2_sr =
-          out.emissivity_frac * black_w_m2_sr(band, seen.temperature_k) * out.air_frac;
+      out.emission_w_m2_sr = out.emissivity_frac * black_w_m2_sr(band, emitting_k) * out.air_frac;
       out.sky_w_m2_sr = glossy->diffuse_frac * diffuse_sky * out.air_frac;
       out.neighbours_w_m2_sr =
           glossy->diffuse_frac * (incoming_w_m2_sr - diffuse_sky) * out.air_frac;
@@ -454,8 +486,7 @@ RadianceTerms BandModel::terms(std::size_t band, const Seen& seen,
       return out;
     }
   }
-  out.emission_w_m2_sr =
-      out.emissivity_frac * black_w_m2_sr(band, seen.temperature_k) * out.air_frac;
+  out.emission_w_m2_sr = out.emissivity_frac * black_w_m2_sr(band, emitting_k) * out.air_frac;
   out.sky_w_m2_sr = reflected * from_sky;
   out.neighbours_w_m2_sr = reflected * (incoming_w_m2_sr - from_sky);
   out.sun_w_m2_sr = (1.0 - out.emissivity_frac) * params.sun_irradiance_w_m2 / physics::kPi *

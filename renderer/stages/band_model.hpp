@@ -78,6 +78,8 @@ class BandModel final : public BandLights {
     glm::vec3 to_viewer{0.0F, 0.0F, 1.0F};
     glm::vec3 to_sun{0.0F, 0.0F, 1.0F};
     float glint_per_sr = 0.0F;
+    float clutter_sd = 0.0F;           ///< mean of the clutter's field over the pixel
+    float clutter_variance_k2 = 0.0F;  ///< of the temperature within the pixel
   };
   /// Splits the radiance of a pixel of the instant of update(). `incoming_w_m2_sr` is what arrives
   /// at the surface from everything but the sun. Twin of radiance.comp, in float32 like that.
@@ -111,6 +113,9 @@ class BandModel final : public BandLights {
   [[nodiscard]] std::uint32_t first_lobe() const noexcept { return first_lobe_; }
   /// True if air_nodes() differ from frame to frame.
   [[nodiscard]] bool air_nodes_change() const noexcept { return air_model_ != 0 || lobes_; }
+  /// Index of the first change of an emissivity per standard deviation of the clutter, in the same
+  /// order.
+  [[nodiscard]] std::uint32_t first_emissivity_sd() const noexcept { return first_emissivity_sd_; }
   /// Inverse of the band radiance, by band. Setup only.
   [[nodiscard]] std::vector<physics::ApparentTemperature> apparent_temperatures() const;
 
@@ -166,6 +171,7 @@ class BandModel final : public BandLights {
   std::uint32_t air_terms_ = 0;
   std::uint32_t air_table_ = 0;
   std::uint32_t max_terms_ = 0;
+  std::uint32_t first_emissivity_sd_ = 0;
   std::uint32_t first_emissivity_ = 0;
   std::uint32_t first_lobe_ = 0;
   std::optional<LobeModel> lobes_;  ///< empty without glossy materials

@@ -29,6 +29,8 @@ constexpr double kFieldMarginFrac = 0.5;
 /// The camera may point anywhere.
 constexpr double kAnyCosine = -2.0;
 
+static_assert(kTwinSd == EMIT_CLUTTER_TWIN_SD);
+
 /// Angle of one pixel at the boresight, with the narrowest field of view.
 double pixel_rad(const scene::SensorDesc& sensor) {
   return 2.0 * std::tan(0.5 * sensor.narrowest_fov_rad()) / sensor.width_px;
@@ -121,7 +123,7 @@ std::vector<CachedStage::Eye> CachedStage::eyes_around(std::span<const RefineVie
 physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
     const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
     std::vector<FosterMaterial> foster_materials, const SceneHistory& history,
-    const BandLights& lights, bool software) {
+    const BandLights& lights, std::span<const DrawnClutter> clutter, bool software) {
   // Collect the positions that the scenario's camera takes.
   const std::vector<RefineView::Eye> eyes = all_eyes(scenario.sensor.trajectory);
   std::vector<glm::dvec3> eyes_world_m;
@@ -154,15 +156,15 @@ physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
   }
   return std::unique_ptr<ThermalStage>(new CachedStage(
       scenario, bounds, eyes_around(eyes, bounds), std::move(*surface), std::move(foster_materials),
-      history, sees_in_band(scenario.thermal) ? &lights : nullptr, std::move(saved),
+      history, sees_in_band(scenario.thermal) ? &lights : nullptr, clutter, std::move(saved),
       coarse->visibly, std::move(shade_pass), software));
 }
 
 CachedStage::CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb& static_bounds,
                          std::vector<Eye> detail_eyes, std::unique_ptr<CachedSurface> surface,
                          std::vector<FosterMaterial> foster_materials, const SceneHistory& history,
-                         const BandLights* lights, std::optional<SavedSurface> saved,
-                         bool visibly_simplified, std::optional<ShadePass> shade_pass,
+                         const BandLights* lights, std::span<const DrawnClutter> clutter,
+                         std::optional<SavedSurface> saved, bool visibly_simplified, std::optional<ShadePass> shade_pass,
                          bool software)
     : sensor_(scenario.sensor),
       max_samples_(scenario.thermal.max_samples),
@@ -173,6 +175,7 @@ CachedStage::CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb&
       history_of_object_(histories_of_objects(scenario)),
       history_(history),
       lights_(lights),
+      clutter_(clutter.begin(), clutter.end()),
       plan_(scenario.thermal),
       surface_history_(scenario.thermal.steps,
                        make_foster(scenario, std::move(foster_materials), history.environment,
@@ -208,10 +211,10 @@ physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
   // Send the meshes to the device. Release the memory of the old ones first.
   drawn_.reset();
   drawn_ = std::make_unique<DrawnScene>(surface_->take_drawn_scene(), history_of_object_,
-                                        surface_->anchors(), software_);
+                                        surface_->anchors(), clutter_, software_);
   // Allocate the buffers of the samples.
   for (gl::Buffer& node : node_buffers_) {
-    node = gl::Buffer::dynamic(surface_->model().drawn_samples * sizeof(SampleVertex));
+    node = gl::Buffer::dynamic(surface_->vertices(0).size_bytes());
   }
   if (lights_ != nullptr) {
     for (gl::Buffer& node : seen_buffers_) {
@@ -378,6 +381,13 @@ void CachedStage::bind() const noexcept {
     drawn_->vertices.read_seen(seen_buffers_[surface_->storage(0)],
                                seen_buffers_[surface_->storage(1)],
                                static_cast<std::uint32_t>(lights_->bands()));
+  }
+  if (!clutter_.empty()) {
+    // Without twins nothing is added to the sample's own temperature.
+    const std::size_t drawn = surface_->model().drawn_samples;
+    const bool twins = surface_->vertices(0).size() > drawn;
+    drawn_->vertices.read_twins(node_buffers_[surface_->storage(0)],
+                                node_buffers_[surface_->storage(1)], twins ? drawn : 0);
   }
   if (shade_pass_) drawn_->vertices.read_shade(shade_buffer_);
 }

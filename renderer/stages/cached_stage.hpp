@@ -18,12 +18,13 @@ namespace emit::renderer {
 class CachedStage final : public ThermalStage {
  public:
   /// Simplifies the meshes, creates the surface and compiles the passes. `lights` outlives the
-  /// stage. `software` says that the device is a CPU. Errors: those of CachedSurface::create(), gpu
+  /// stage. `clutter` is by material of the geometry; empty: none varies. `software` says that the
+  /// device is a CPU. Errors: those of CachedSurface::create(), gpu
   /// (names the shader).
   [[nodiscard]] static physics::Result<std::unique_ptr<ThermalStage>> create(
       const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
       std::vector<FosterMaterial> foster_materials, const SceneHistory& history,
-      const BandLights& lights, bool software);
+      const BandLights& lights, std::span<const DrawnClutter> clutter, bool software);
   /// True if vertices have what other samples send them in band (SceneVertexArrays::read_seen).
   [[nodiscard]] static bool sees_in_band(const scene::ThermalOptions& options) noexcept {
     return options.method == scene::ThermalMethod::cached &&
@@ -72,7 +73,8 @@ class CachedStage final : public ThermalStage {
   CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb& static_bounds,
               std::vector<Eye> detail_eyes, std::unique_ptr<CachedSurface> surface,
               std::vector<FosterMaterial> foster_materials, const SceneHistory& history,
-              const BandLights* lights, std::optional<SavedSurface> saved, bool visibly_simplified,
+              const BandLights* lights, std::span<const DrawnClutter> clutter,
+              std::optional<SavedSurface> saved, bool visibly_simplified,
               std::optional<ShadePass> shade_pass, bool software);
 
   scene::SensorDesc sensor_;
@@ -85,6 +87,7 @@ class CachedStage final : public ThermalStage {
   std::vector<std::int32_t> history_of_object_;
   const SceneHistory& history_;
   const BandLights* lights_;  ///< null without sees_in_band()
+  std::vector<DrawnClutter> clutter_;
   StepPlan plan_;
   SurfaceHistory surface_history_;
   std::unique_ptr<CachedSurface> surface_;

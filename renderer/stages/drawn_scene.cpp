@@ -14,10 +14,11 @@ DrawnScene::DrawnScene(scene::SceneGeometry scene, std::span<const std::int32_t>
       vertices(buffers, light_record_buffer) {}
 
 DrawnScene::DrawnScene(SampledScene scene, std::span<const std::int32_t> history_of_object,
-                       std::vector<EntityAnchor> anchors, bool software)
+                       std::vector<EntityAnchor> anchors, std::span<const DrawnClutter> clutter,
+                       bool software)
     : cull(software ? std::make_unique<TriangleCull>() : nullptr),
       buffers(std::move(scene), cull.get()),
-      lists(buffers, history_of_object, 0, cull.get(), std::move(anchors)),
+      lists(buffers, history_of_object, 0, cull.get(), std::move(anchors), clutter),
       record_buffer(gl::Buffer::dynamic(lists.max_records() * sizeof(DrawRecord))),
       light_record_buffer(gl::Buffer::dynamic(lists.max_light_records() * sizeof(LightRecord))),
       vertices(buffers, light_record_buffer) {}

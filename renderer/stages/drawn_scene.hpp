@@ -22,9 +22,10 @@ struct DrawnScene {
              std::uint32_t max_passes);
   /// Scene of thermal samples, without shadow maps. `anchors` are those of DrawLists. `software`
   /// says that the rasteriser runs on a CPU, where a small triangle costs as much as a large one;
-  /// then triangles are culled here.
+  /// then triangles are culled here. `clutter` is that of DrawLists.
   DrawnScene(SampledScene scene, std::span<const std::int32_t> history_of_object,
-             std::vector<EntityAnchor> anchors, bool software);
+             std::vector<EntityAnchor> anchors, std::span<const DrawnClutter> clutter,
+             bool software);
   DrawnScene(const DrawnScene&) = delete;
   DrawnScene& operator=(const DrawnScene&) = delete;
 

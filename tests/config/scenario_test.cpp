@@ -631,6 +631,52 @@ TEST_F(ConfigTest, gas_is_read_checked_and_printed) {
   EXPECT_THAT(calm->warnings, ::testing::Contains(::testing::HasSubstr("smoke does not drift")));
 }
 
+TEST_F(ConfigTest, clutter_is_read_checked_and_printed) {
+  const std::string body =
+      "[[object]]\nname = \"lot\"\nmaterial = \"concrete\"\ngltf = \"a.glb\"\n";
+  const auto loaded = scenario(body +
+                               "[[clutter]]\nmaterial = \"concrete\"\nshortest_m = 0.5\n"
+                               "longest_m = 16\nslope = 2\nseed = 7\ninertia_sd_ln = 0.2\n"
+                               "solar_absorptance_sd_frac = -0.02\nemissivity_sd_frac = 0.01\n"
+                               "band_emissivity_sd_frac = { \"8-12\" = 0.005 }\n");
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
+  ASSERT_TRUE(loaded->materials[0].clutter.has_value());
+  const scene::Clutter& clutter = *loaded->materials[0].clutter;
+  EXPECT_EQ(clutter.longest_m, 16.0);
+  EXPECT_EQ(clutter.seed, 7U);
+  EXPECT_EQ(clutter.solar_absorptance_sd_frac, -0.02);
+  EXPECT_EQ(scene::emissivity_sd_frac(clutter, "8-12"), 0.005);
+  EXPECT_EQ(scene::emissivity_sd_frac(clutter, "3-5"), 0.01);
+  const auto again = load_scenario(write("p.toml", print_scenario(*loaded)), {}, options_);
+  ASSERT_TRUE(again.has_value()) << again.error().text;
+  EXPECT_EQ(print_scenario(*again), print_scenario(*loaded));
+  ASSERT_TRUE(again->materials[0].clutter.has_value());
+  EXPECT_EQ(again->materials[0].clutter->inertia_sd_ln, 0.2);
+  const std::string head = "[[clutter]]\nmaterial = \"concrete\"\n";
+  const std::vector<std::pair<std::string, std::string>> faults{
+      {"[[clutter]]\ninertia_sd_ln = 0.1\n", "key 'material' is missing"},
+      {"[[clutter]]\nmaterial = \"concret\"\ninertia_sd_ln = 0.1\n",
+       "there is no material 'concret', did you mean 'concrete'?"},
+      {head, "[[clutter]] changes nothing"},
+      {head + "inertia_sd_ln = 0.1\nlongest_m = 0.1\n",
+       "'longest_m' (0.1) must be above 'shortest_m' (0.25), and at most 32 times it"},
+      {head + "inertia_sd_ln = 0.1\nlongest_m = 9\n", "at most 32 times it"},
+      {head + "emissivity_sd_frac = 0.05\n", "'emissivity_sd_frac' leads out of 0 to 1"},
+      {head + "band_emissivity_sd_frac = { \"8-13\" = 0.001 }\n",
+       "'band_emissivity_sd_frac': there is no band '8-13'"},
+      {head + "inertia_sd_ln = 0.1\n" + head + "inertia_sd_ln = 0.2\n",
+       "material 'concrete' has another [[clutter]] already"},
+      {head + "inertia_sd_ln = 0.1\n[thermal]\nmethod = \"per-frame\"\n",
+       "[[clutter]] needs thermal.method"},
+      {head + "inertia_sd_ln = 0.1\n[[object]]\nname = \"jet\"\nentity_id = 3\ngltf = "
+              "\"a.glb\"\n[[object.parts]]\nname = \"engine\"\nmaterial = \"concrete\"\n",
+       "material 'concrete' varies: part 'engine' of object 'jet' cannot have it"},
+  };
+  for (const auto& [text, message] : faults) {
+    EXPECT_THAT(scenario_error(body + text), ::testing::HasSubstr(message)) << text;
+  }
+}
+
 TEST_F(ConfigTest, endings_of_scene_files_may_be_upper_case) {
   for (const std::string name : {"TRUCK.GLB", "truck.Gltf"}) {
     const auto loaded = scenario("[[object]]\ngltf = \"" + name + "\"\n");

@@ -80,6 +80,10 @@ struct ScenarioHead {
   std::vector<std::filesystem::path> materials;
   std::string default_material;
 };
+struct ClutterDraft {
+  std::string material;
+  scene::Clutter clutter;
+};
 struct DaemonHead {
   std::string scenario;
 };
@@ -104,6 +108,7 @@ struct DaemonHead {
 [[nodiscard]] const KeyTable<scene::ChannelDetector>& detector_keys();
 [[nodiscard]] const KeyTable<ObjectDraft>& object_keys();
 [[nodiscard]] const KeyTable<scene::ContactDesc>& contact_keys();
+[[nodiscard]] const KeyTable<ClutterDraft>& clutter_keys();
 [[nodiscard]] const KeyTable<scene::PlumeDesc>& plume_keys();
 [[nodiscard]] const KeyTable<scene::FlareDesc>& flare_keys();
 [[nodiscard]] const KeyTable<scene::SmokeDesc>& smoke_keys();

@@ -153,6 +153,11 @@ std::string print_scenario(const scene::ScenarioDesc& scenario) {
   for (const scene::ContactDesc& contact : scenario.contacts) {
     print_section("[[contact]]", contact, contact_keys(), out);
   }
+  for (const scene::Material& material : scenario.materials) {
+    if (!material.clutter) continue;
+    print_section("[[clutter]]", ClutterDraft{material.name, *material.clutter}, clutter_keys(),
+                  out);
+  }
   for (const auto& plume : scenario.gas.plumes) {
     print_section("[[plume]]", plume, plume_keys(), out);
   }

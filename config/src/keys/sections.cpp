@@ -69,6 +69,12 @@ const std::vector<SectionDoc>& scenario_sections() {
                   "three dimensions conducts from body to body; all else ignores the section with "
                   "a warning.",
                   contact_keys(), scene::ContactDesc{}),
+      section_doc("clutter", true,
+                  "Variation of a material from place to place "
+                  "([clutter.md](../renderer/docs/clutter.md)): a random field that changes what "
+                  "the material absorbs, emits and stores. It needs `thermal.method` cached and "
+                  "`thermal.model` foster.",
+                  clutter_keys(), ClutterDraft{}),
       section_doc("plume", true,
                   "The exhaust jet of an object ([gas.md](../renderer/docs/gas.md)): a throttle "
                   "of a part drives it.",

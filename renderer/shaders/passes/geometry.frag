@@ -18,6 +18,35 @@ layout(location = 2) out uint object;
 in vec3 normal_relworld;
 layout(location = EMIT_NORMAL) out vec2 normal_octahedral;
 #endif
+#ifdef EMIT_CLUTTER
+in vec3 tile_position;
+in vec2 clutter_k;
+#ifdef EMIT_OBJECTS
+layout(location = 3) out uvec4 clutter;
+#else
+layout(location = 2) out uvec4 clutter;
+#endif
+
+// What passes/clutter.glsl needs of the pixel: place in the field, slopes of the temperature, and the footprint.
+uvec4 packed_clutter() {
+  // Take the plane that the triangle faces most.
+  vec3 across = dFdx(tile_position) * float(EMIT_CLUTTER_SIDE);
+  vec3 down = dFdy(tile_position) * float(EMIT_CLUTTER_SIDE);
+  vec3 facing = abs(cross(across, down));
+  bool level = facing.z >= max(facing.x, facing.y);
+  bool along = facing.x >= facing.y;
+  vec2 place = level ? tile_position.xy : along ? tile_position.yz : tile_position.xz;
+  vec2 a = level ? across.xy : along ? across.yz : across.xz;
+  vec2 b = level ? down.xy : along ? down.yz : down.xz;
+  float size_a = dot(a, a);
+  float size_b = dot(b, b);
+  vec2 longer = size_a >= size_b ? a : b;
+  float width_frac = sqrt(min(size_a, size_b) / max(max(size_a, size_b), 1e-20));
+  uvec2 steps = uvec2(fract(place) * EMIT_CLUTTER_PLACE_STEPS) << 8;
+  return uvec4(steps.x | uint(width_frac * 255.0 + 0.5), steps.y | draw.field,
+               packHalf2x16(clamp(longer, -60000.0, 60000.0)), packHalf2x16(clutter_k));
+}
+#endif
 
 void main() {
   // Turn the cosine of the sun to the side that faces the camera, and pack what the pixel shows.
@@ -31,6 +60,9 @@ void main() {
 #ifdef EMIT_NORMAL
   vec3 n = normalize(normal_relworld);
   normal_octahedral = octahedral_from_unit(gl_FrontFacing ? n : -n);
+#endif
+#ifdef EMIT_CLUTTER
+  clutter = draw.field != 0u ? packed_clutter() : uvec4(0u);
 #endif
 }
 #else

@@ -26,6 +26,16 @@ out EMIT_BANDS_VEC incoming_w_m2_sr;
 // share of the sun.
 layout(location = EMIT_ATTR_NODE_BEFORE) in vec2 node_before;
 layout(location = EMIT_ATTR_NODE_AFTER) in vec2 node_after;
+#ifdef EMIT_CLUTTER
+// Temperature offsets in K of the twins of the sample, at the same nodes.
+layout(location = EMIT_ATTR_LOW_BEFORE) in float low_before;
+layout(location = EMIT_ATTR_LOW_AFTER) in float low_after;
+layout(location = EMIT_ATTR_HIGH_BEFORE) in float high_before;
+layout(location = EMIT_ATTR_HIGH_AFTER) in float high_after;
+// Place in the field, in tiles, and the change of the temperature in K per standard deviation and per its square.
+out vec3 tile_position;
+out vec2 clutter_k;
+#endif
 #ifdef EMIT_SHADE
 // Temperature in K that recent shade of entities has taken off the sample in full sun. It is added back here, because
 // passes/shade.comp subtracts the shade of each pixel.
@@ -52,6 +62,15 @@ void main() {
   float per_length = inversesqrt(max(dot(n, n), 1e-30));
   float cosine = dot(n, frame.to_sun) * per_length * frame.sun_up;
   vec2 now = mix(node_before, node_after, frame.node_frac);
+#ifdef EMIT_CLUTTER
+  // Put a parabola through the sample and its twins.
+  float low = mix(low_before, low_after, frame.node_frac) - now.x;
+  float high = mix(high_before, high_after, frame.node_frac) - now.x;
+  clutter_k = draw.twins * 0.5 *
+              vec2((high - low) / EMIT_CLUTTER_TWIN_SD, (high + low) / (EMIT_CLUTTER_TWIN_SD * EMIT_CLUTTER_TWIN_SD));
+  vec4 at_mesh = vec4(position_mesh_m, 1.0);
+  tile_position = vec3(dot(draw.tile_row[0], at_mesh), dot(draw.tile_row[1], at_mesh), dot(draw.tile_row[2], at_mesh));
+#endif
 #ifdef EMIT_SHADE
   now.x += shade_k * now.y * max(cosine, 0.0);
   // Take the share of the sky at the attitude of the frame, as far as the entity has moved (view_of_now.hpp).

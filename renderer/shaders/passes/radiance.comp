@@ -7,6 +7,7 @@
 //   EMIT_AIR_TABLE  bit per band: the air is a table
 //   EMIT_AIR_MODEL  bit per band: the air is built in
 //   EMIT_OUTPUTS    planes besides radiance, EMIT_OUTPUT_*
+//   EMIT_CLUTTER    defined: some materials vary from place to place
 //   EMIT_LOBES      index of the first number of the lobes, if there are glossy materials
 //   EMIT_ROWS       number of blocks of 8 x 8 pixels, one below the other, that a work group computes
 #include "passes/gbuffer.glsl"
@@ -42,6 +43,11 @@ struct Seen {
   float sun_cosine;  // cosine of the sun's incidence times the visible share of the sun
   uint material;
   uint object;
+#ifdef EMIT_CLUTTER
+  float clutter_sd;           // mean of the clutter's field over the pixel
+  float clutter_k;            // what it adds to the temperature
+  float clutter_variance_k2;  // variance of the temperature within the pixel
+#endif
 #ifndef EMIT_CACHED
   float normal_up;   // vertical component of the unit normal
 #endif
@@ -51,6 +57,10 @@ struct Seen {
 layout(binding = EMIT_TEX_SURFACE) uniform usampler2D surface_texture;
 layout(binding = EMIT_TEX_INCOMING) uniform sampler2D incoming_texture;
 
+#ifdef EMIT_CLUTTER
+#include "passes/clutter.glsl"
+#endif
+
 // Reads what a pixel shows of the sampled surface.
 Seen seen_at(ivec2 px) {
   uvec2 texel = texelFetch(surface_texture, px, 0).rg;
@@ -58,8 +68,15 @@ Seen seen_at(ivec2 px) {
   float depth = texelFetch(depth_texture, px, 0).r;
   float boresight_m = depth > 0.0 ? frame.near_m / depth : EMIT_SKY_DEPTH_M;
   uint object = (EMIT_OUTPUTS & EMIT_OUTPUT_OBJECT) != 0u ? texelFetch(ids_texture, px, 0).r : 0u;
+#ifdef EMIT_CLUTTER
+  Clutter clutter = clutter_at(px);
+  return Seen(boresight_m, texel_temperature_k(texel) + clutter.shift_k, texel_open_frac(texel),
+              texel_sun_cosine(texel), texel_material(texel), object, clutter.sd, clutter.shift_k,
+              clutter.variance_k2);
+#else
   return Seen(boresight_m, texel_temperature_k(texel), texel_open_frac(texel), texel_sun_cosine(texel),
               texel_material(texel), object);
+#endif
 }
 #else
 layout(binding = EMIT_TEX_OCCLUSION) uniform sampler2D occlusion_texture;
@@ -145,7 +162,15 @@ vec2 leaving_w_m2_sr(uint band, Seen seen, float incoming, inout bool clamped) {
   vec4 lut = vec4(bands[band].lut_first_k, bands[band].lut_nodes_per_k, bands[band].lut_last_node,
                   float(band * frame.band_lut_nodes));
   float emissivity_frac = texelFetch(band_lut, int(frame.first_emissivity + seen.material * EMIT_BANDS + band)).r;
-  float emitted = emissivity_frac * planck_lut_radiance_w_m2_sr(seen.temperature_k, lut, clamped);
+  float emitting_k = seen.temperature_k;
+#ifdef EMIT_CLUTTER
+  emissivity_frac += seen.clutter_sd * texelFetch(band_lut, int(frame.first_emissivity_sd + seen.material * EMIT_BANDS +
+                                                                band)).r;
+  // Radiance is averaged over the pixel, not temperature: to second order the mean is that of a warmer surface.
+  float per_k = 1.0 / max(emitting_k, 1.0);
+  emitting_k += 0.5 * seen.clutter_variance_k2 * (bands[band].curvature_k * per_k - 2.0) * per_k;
+#endif
+  float emitted = emissivity_frac * planck_lut_radiance_w_m2_sr(emitting_k, lut, clamped);
   // Add the diffuse reflection.
   float sunlight = bands[band].sun_irradiance_w_m2 / EMIT_PI * seen.sun_cosine;
   return vec2(emitted + (1.0 - emissivity_frac) * incoming, (1.0 - emissivity_frac) * sunlight);
@@ -166,7 +191,12 @@ LobePixel lobe_of(ivec2 px, Seen seen, bool surface) {
 vec2 glossy_leaving_w_m2_sr(uint band, Seen seen, LobePixel lobe, vec2 tilt, float incoming, inout bool clamped) {
   vec4 lut = vec4(bands[band].lut_first_k, bands[band].lut_nodes_per_k, bands[band].lut_last_node,
                   float(band * frame.band_lut_nodes));
-  float black = planck_lut_radiance_w_m2_sr(seen.temperature_k, lut, clamped);
+  float emitting_k = seen.temperature_k;
+#ifdef EMIT_CLUTTER
+  float per_k = 1.0 / max(emitting_k, 1.0);
+  emitting_k += 0.5 * seen.clutter_variance_k2 * (bands[band].curvature_k * per_k - 2.0) * per_k;
+#endif
+  float black = planck_lut_radiance_w_m2_sr(emitting_k, lut, clamped);
   return lobe_leaving_w_m2_sr(band, lobe, black, incoming, sky_at_tilt_w_m2_sr(band, tilt),
                               bands[band].surroundings_radiance_w_m2_sr, bands[band].sun_irradiance_w_m2);
 }
@@ -267,6 +297,13 @@ void write_pixel(ivec2 px) {
   if ((EMIT_OUTPUTS & EMIT_OUTPUT_TERMS) != 0u) {
     for (uint i = 0u; i < EMIT_BANDS; ++i) planes[plane++ * plane_px + pixel] = surface ? incoming[i] : 0.0;
     planes[plane++ * plane_px + pixel] = surface ? float(seen.material) : 0.0;
+#ifdef EMIT_CLUTTER
+    planes[plane++ * plane_px + pixel] = surface ? seen.clutter_sd : 0.0;
+    planes[plane++ * plane_px + pixel] = surface ? seen.clutter_k : 0.0;
+    planes[plane++ * plane_px + pixel] = surface ? seen.clutter_variance_k2 : 0.0;
+#else
+    for (int i = 0; i < 3; ++i) planes[plane++ * plane_px + pixel] = 0.0;
+#endif
     vec4 glossy = vec4(0.0);
 #ifdef EMIT_LOBES
     if (lobe.block != 0) glossy = vec4(lobe.normal, lobe.glint_per_sr);

@@ -46,6 +46,8 @@
 #define EMIT_TEX_TARGET_ROWS 23
 #define EMIT_TEX_INCOMING 24
 #define EMIT_TEX_GAS_PUFFS 25
+#define EMIT_TEX_CLUTTER 26
+#define EMIT_TEX_CLUTTER_PIXELS 27
 
 // Image units.
 #define EMIT_IMG_OCCLUSION 0
@@ -63,6 +65,10 @@
 #define EMIT_ATTR_HULL 8
 #define EMIT_ATTR_SEEN_BEFORE 9
 #define EMIT_ATTR_SEEN_AFTER 10
+#define EMIT_ATTR_LOW_BEFORE 11
+#define EMIT_ATTR_LOW_AFTER 12
+#define EMIT_ATTR_HIGH_BEFORE 13
+#define EMIT_ATTR_HIGH_AFTER 14
 
 #define EMIT_MAX_CASCADES 4
 #define EMIT_MAX_BANDS 4
@@ -92,6 +98,16 @@
 #define EMIT_GAS_SAMPLES_SHIFT 2u
 #define EMIT_GAS_FAR_M 1e7f
 
+// Clutter: texels along the edge of a tile, levels of a field, values that stand for +-1 in its texels, places in a pixel
+// at which it is taken, and the value at which twins of samples are solved.
+#define EMIT_CLUTTER_SIDE 1024
+#define EMIT_CLUTTER_LEVELS 11
+#define EMIT_CLUTTER_MOST_SD 4.0
+#define EMIT_CLUTTER_TAPS 8
+#define EMIT_CLUTTER_TWIN_SD 1.5
+// Steps of a place in a tile, of 24 bits.
+#define EMIT_CLUTTER_PLACE_STEPS 16777215.0
+
 // Boresight distance that the geometry buffer holds for a pixel without a surface.
 #define EMIT_SKY_DEPTH_M 1e30f
 
@@ -101,8 +117,8 @@
 #define EMIT_OUTPUT_OBJECT 4u
 #define EMIT_OUTPUT_SUN 8u
 #define EMIT_OUTPUT_SKY 16u
-// Radiance that arrives at the surface, a plane for each band, then the material, then the normal and the glint of a
-// glossy surface.
+// Radiance that arrives at the surface, a plane for each band, then the material, three of its clutter, and the normal
+// and the glint of a glossy surface.
 #define EMIT_OUTPUT_TERMS 32u
 
 // Indices of FrameStatsGpu.flagged_px.

@@ -20,7 +20,7 @@ struct FrameParams {
   float sensor_height_m;      // above sea level
   uvec2 output_px;            // columns and rows of the output image
   uint output_plane_px;       // number of its pixels
-  uint unused1;
+  uint first_emissivity_sd;   // clutter: index of the first change of an emissivity in the buffer of the tables
   uvec4 rendered_window_px;   // requested part of the rendered image: first column, first row, end column, end row
   uvec4 output_window_px;     // the same part of the output image, in its pixels
   float obscurance_radius_m;
@@ -45,6 +45,11 @@ struct DrawParams {
   uint object;               // 1 + index of the scenario's object
   uint moves;                // 1: the object is an entity; 0: it is static
   float moved_frac;          // cached: EntityStand::moved_frac of an entity
+  vec4 tile_row[3];          // clutter: dot(row, vec4(p_mesh, 1)) is a coordinate that counts tiles of the field
+  uint field;                // clutter: 1 + number of the field; 0: the material does not vary
+  float twins;               // clutter: 1: the samples have twins; 0: their temperature does not vary
+  uint unused0;
+  uint unused1;
 };
 
 // Four texels of the material table.
@@ -153,7 +158,7 @@ struct BandParams {
   vec4 terms_extinction_per_m;
   float air_radiance_w_m2_sr;           // blackbody at air temperature
   float surroundings_radiance_w_m2_sr;  // blackbody at the temperature of the surroundings
-  float unused0;
+  float curvature_k;                    // L'' / L' of the blackbody is curvature_k / T^2 - 2 / T
   float vertical_transmittance_frac;    // ground to space
   float sun_irradiance_w_m2;            // in band, normal to the sun, at the ground
   float lut_first_k;                    // temperature of the first node of the band's T ln L table
@@ -186,8 +191,10 @@ EMIT_SHARED_OFFSET(FrameParams, obscurance_radius_m, 144);
 EMIT_SHARED_OFFSET(FrameParams, band_lut_nodes, 160);
 EMIT_SHARED_OFFSET(FrameParams, to_sun, 176);
 EMIT_SHARED_OFFSET(FrameParams, sun_up, 188);
-static_assert(sizeof(DrawParams) == 128);
+static_assert(sizeof(DrawParams) == 192);
 EMIT_SHARED_OFFSET(DrawParams, material, 112);
+EMIT_SHARED_OFFSET(DrawParams, tile_row, 128);
+EMIT_SHARED_OFFSET(DrawParams, field, 176);
 static_assert(sizeof(MaterialParams) == 64);
 EMIT_SHARED_OFFSET(MaterialParams, initial_offset_k, 16);
 EMIT_SHARED_OFFSET(MaterialParams, resistance_m2k_w, 32);

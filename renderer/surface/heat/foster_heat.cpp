@@ -342,7 +342,7 @@ bool FosterHeat::begin_advance(const SampleAdvance& each, const HeatInterval& in
   }
   // Heat from neighbours shifts the temperature above which the own flux acts. Its mean over
   // the interval is added to the base.
-  if (sample.column != kNoSample) {
+  if (sample.column != kNoSample || sample.twin_of != kNoSample) {
     surface.base_offset_k += each.state->aside_k() + 0.5 * drive.aside.change_k;
   }
   // Let the modes decay without any flux if all faces are covered.

@@ -53,6 +53,14 @@ class FosterHeat {
   [[nodiscard]] bool rests_on_body(std::uint32_t material) const noexcept {
     return materials_[material].body;
   }
+  /// Returns the first of the two twins of a material; 0: it has none.
+  [[nodiscard]] std::uint32_t first_twin(std::uint32_t material) const noexcept {
+    return materials_[material].first_twin;
+  }
+  [[nodiscard]] bool has_twins() const noexcept {
+    return std::ranges::any_of(
+        materials_, [](const FosterMaterial& material) { return material.first_twin != 0; });
+  }
   [[nodiscard]] bool has_bodies() const noexcept {
     return std::ranges::any_of(materials_, &FosterMaterial::body);
   }

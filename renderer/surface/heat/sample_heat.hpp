@@ -69,6 +69,16 @@ class SampleHeat {
     const auto* foster = std::get_if<FosterHeat>(&model_);
     return foster != nullptr && foster->has_bodies();
   }
+  /// Returns the first of the two twins of a material; 0: it has none.
+  [[nodiscard]] std::uint32_t first_twin(std::uint32_t material) const noexcept {
+    const auto* foster = std::get_if<FosterHeat>(&model_);
+    return foster == nullptr ? 0 : foster->first_twin(material);
+  }
+  /// Returns whether any material has twins.
+  [[nodiscard]] bool has_twins() const noexcept {
+    const auto* foster = std::get_if<FosterHeat>(&model_);
+    return foster != nullptr && foster->has_twins();
+  }
   /// The extended thermal model; null with emit2014.
   [[nodiscard]] const FosterHeat* foster() const noexcept {
     return std::get_if<FosterHeat>(&model_);

@@ -11,8 +11,8 @@
 
 namespace emit::renderer {
 
-/// Values of a drawn sample at one node of time. The device interpolates them over the surface and
-/// between nodes.
+/// Values of a drawn sample, or of a twin of one, at one node of time. The device interpolates them
+/// over the surface and between nodes.
 struct SampleVertex {
   float offset_k = 0.0F;  ///< temperature from the reference temperature
   float sun_frac = 0.0F;  ///< visible share of the sun's disc
@@ -68,9 +68,12 @@ class ChangedRanges {
 
 /// State of all samples at one node of time: everything that the next interval starts from.
 struct SurfaceNode {
+  std::uint32_t drawn = 0;  ///< number of drawn samples
   std::vector<SampleState> states;
   std::vector<SampleOutput> outputs;
-  std::vector<SampleVertex> vertices;  ///< values of the drawn samples, for the device
+  /// Values of the drawn samples, for the device. Behind them come those of the low and of the high
+  /// twins, if there are any: SurfaceSample::vertex says where a sample has its own.
+  std::vector<SampleVertex> vertices;
   ChangedRanges changes;               ///< ranges of `vertices` that have changed
   /// Radiance from other samples, by sample, then band (BandExchange). It is empty without bands.
   std::vector<float> seen_w_m2_sr;

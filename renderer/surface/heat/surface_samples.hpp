@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <glm/ext/vector_float3.hpp>
@@ -73,6 +74,11 @@ struct SurfaceSample {
   float facet_m = 0.0F;  ///< longest edge of the triangles on which it lies, before any is halved
   /// Column in SurfaceSamples::columns; kNoSample where heat moves straight down alone.
   std::uint32_t column = kNoSample;
+  /// Place of its values in SurfaceNode::vertices; kNoSample: it has none.
+  std::uint32_t vertex = kNoSample;
+  /// Sample whose clutter this one stands for: it has the same place and view and a twin of its
+  /// material. kNoSample: it stands for itself.
+  std::uint32_t twin_of = kNoSample;
 };
 
 /// Measure by which directions count when a sample looks for sky.
@@ -117,7 +123,24 @@ struct SurfaceSamples {
   std::vector<SeenSample> seen;       ///< lists of all samples, one after the other
   std::vector<SampleColumn> columns;  ///< ascending by sample
   std::vector<CellLink> links;        ///< of all columns, one after the other
+  /// Samples that have twins, ascending. Their low twins are the samples from `first_twin` on, in
+  /// the same order, and behind them the high ones.
+  std::vector<std::uint32_t> twinned;
+  std::uint32_t first_twin = 0;
 };
+
+/// The twins of a sample; both are kNoSample if it has none.
+struct SampleTwins {
+  std::uint32_t low = kNoSample;
+  std::uint32_t high = kNoSample;
+};
+[[nodiscard]] inline SampleTwins twins_of(const SurfaceSamples& all,
+                                          std::uint32_t index) noexcept {
+  const auto found = std::ranges::lower_bound(all.twinned, index);
+  if (found == all.twinned.end() || *found != index) return {};
+  const auto low = all.first_twin + static_cast<std::uint32_t>(found - all.twinned.begin());
+  return {low, low + static_cast<std::uint32_t>(all.twinned.size())};
+}
 
 /// Returns whether a sample is advanced on its own. It is false for the second side of a sheet,
 /// which follows from the first one.

@@ -67,7 +67,7 @@ void BandExchange::work(std::size_t units, const SurfaceSamples& all, const Inte
     }
   });
   worked_ = units;
-  const std::size_t drawn = to.vertices.size();
+  const std::size_t drawn = to.drawn;
   to.seen_changes.add(static_cast<std::uint32_t>(std::min(first, drawn)),
                       static_cast<std::uint32_t>(std::min(end, drawn) - std::min(first, drawn)));
 }

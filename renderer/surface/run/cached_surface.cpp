@@ -113,7 +113,9 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   // Save the surface before the outputs of node 0 change.
   const bool made_anew = model_->drawn.empty();
   if (made_anew) {
-    model_->drawn = make_drawn_meshes(geometry_.geometry(), *model_, nodes_[0].vertices);
+    model_->drawn =
+        make_drawn_meshes(geometry_.geometry(), *model_,
+                          std::span(nodes_[0].vertices).first(model_->drawn_samples));
     if (auto go_on = report(kLevelsFrac); !go_on) return go_on;
   }
   if (made->to_save) {
@@ -157,8 +159,8 @@ void CachedSurface::begin_first_interval(std::int64_t start_ns, const Inputs& in
                                          const StepPlan& plan, SurfaceHistory& history) {
   // Move the states of the model into node 0.
   const BandLights* const lights = model_options().exchange ? inputs.lights : nullptr;
-  nodes_.begin(std::move(model_->states), std::move(model_->outputs), model_->drawn_samples,
-               model_->body_k, lights == nullptr ? 0 : lights->bands());
+  nodes_.begin(std::move(model_->states), std::move(model_->outputs), model_->samples,
+               model_->drawn_samples, model_->body_k, lights == nullptr ? 0 : lights->bands());
   SurfaceNode& first = nodes_[0];
   first.at_ns = start_ns;
   first.surroundings = history.surroundings();
@@ -196,9 +198,11 @@ void CachedSurface::begin_first_interval(std::int64_t start_ns, const Inputs& in
 
 void CachedSurface::fill_first_vertices() {
   SurfaceNode& first = nodes_[0];
-  for (std::uint32_t i = 0; i < model_->drawn_samples; ++i) {
-    const bool moves = geometry_.entities() != 0 && model_->samples.samples[i].entity < 0;
-    first.vertices[i] = {first.outputs[i].offset_k, nodes_[moves ? 1 : 0].outputs[i].sun_frac};
+  const std::vector<SurfaceSample>& all = model_->samples.samples;
+  for (std::uint32_t i = 0; i < all.size(); ++i) {
+    if (all[i].vertex == kNoSample) continue;
+    const bool moves = geometry_.entities() != 0 && all[i].entity < 0;
+    first.vertices[all[i].vertex] = {first.outputs[i].offset_k, nodes_[moves ? 1 : 0].outputs[i].sun_frac};
   }
 }
 
@@ -297,7 +301,7 @@ void CachedSurface::begin_renewal(std::int64_t event_ns, std::int64_t now_ns, co
   if (lags_) end_ns = std::min(end_ns, std::max(event_ns, now_ns) + grid_.answer_ns());
   // Move node 0 to the change, and begin the interval from there anew.
   local_->take_weather_change(event_ns, window(), model_->samples);
-  nodes_.cut(event_ns, end_ns, *local_, workers_);
+  nodes_.cut(event_ns, end_ns, *local_, model_->samples, workers_);
   begin_interval(0, inputs, history);
   renewing_ = true;
   // Make up for the time since the latest frame in this frame.

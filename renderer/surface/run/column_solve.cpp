@@ -79,8 +79,7 @@ void ColumnSolve::work(std::size_t count, SurfaceNode& to, threads::WorkerPool& 
     if (pass_ == Pass::keep && now > 0) {
       const std::uint32_t first = all_.columns[every_[at_]].sample;
       const std::uint32_t last = all_.columns[every_[at_ + now - 1]].sample;
-      const auto drawn = static_cast<std::uint32_t>(to.vertices.size());
-      if (first < drawn) to.changes.add(first, std::min(last + 1, drawn) - first);
+      if (first < to.drawn) to.changes.add(first, std::min(last + 1, to.drawn) - first);
     }
     at_ += now;
     worked_ += now;
@@ -169,7 +168,7 @@ void ColumnSolve::keep(std::uint32_t column, SurfaceNode& to) noexcept {
   keep_cells(system_.equations(column).alone_k, system_.cells_k(column), state);
   change_k_s_[column] = static_cast<float>((state.aside_k() - before_k) / dt_s_);
   heat_.foster()->show_state(all_.samples[sample].material, state, to.outputs[sample]);
-  if (sample < to.vertices.size()) to.vertices[sample].offset_k = to.outputs[sample].offset_k;
+  if (sample < to.drawn) to.vertices[sample].offset_k = to.outputs[sample].offset_k;
 }
 
 std::uint64_t ColumnSolve::bytes() const noexcept {

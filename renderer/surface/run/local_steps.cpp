@@ -46,11 +46,11 @@ std::uint64_t revision_of(std::span<const PartHistory> parts) noexcept {
   return sum;
 }
 
-/// Sets the vertices of a sample at both nodes so that the line between them passes through
+/// Sets the values of a vertex at both nodes so that the line between them passes through
 /// `offset_k` at `at_ns` and through `end` at `end_ns`.
-void draw_line(std::uint32_t sample, std::int64_t at_ns, float offset_k, std::int64_t end_ns,
+void draw_line(std::uint32_t vertex, std::int64_t at_ns, float offset_k, std::int64_t end_ns,
                const SampleOutput& end, const LocalSteps::Window& window) noexcept {
-  if (sample >= window.before.vertices.size()) return;
+  if (vertex == kNoSample) return;
   const double slope_k_ns = (static_cast<double>(end.offset_k) - static_cast<double>(offset_k)) /
                             static_cast<double>(end_ns - at_ns);
   const auto at_node = [&](const SurfaceNode& node) {
@@ -58,10 +58,10 @@ void draw_line(std::uint32_t sample, std::int64_t at_ns, float offset_k, std::in
                                            slope_k_ns * static_cast<double>(node.at_ns - at_ns)),
                         end.sun_frac};
   };
-  window.before.vertices[sample] = at_node(window.before);
-  window.after.vertices[sample] = at_node(window.after);
-  window.before.changes.add(sample, 1);
-  window.after.changes.add(sample, 1);
+  window.before.vertices[vertex] = at_node(window.before);
+  window.after.vertices[vertex] = at_node(window.after);
+  window.before.changes.add(vertex, 1);
+  window.after.changes.add(vertex, 1);
 }
 
 }  // namespace
@@ -332,7 +332,8 @@ void LocalSteps::show(std::span<const std::uint32_t> blocks, std::size_t turn, s
   prepare(at_ns, end_ns, window, inputs);
   step(blocks, std::numeric_limits<std::uint32_t>::max(), window.before, rays_, interval_, inputs,
        [&](std::uint32_t i, const SampleState& state, const SampleOutput& output) {
-         draw_line(i, at_ns, window.before.outputs[i].offset_k, end_ns, output, window);
+         draw_line(inputs.step.all.samples[i].vertex, at_ns, window.before.outputs[i].offset_k,
+                   end_ns, output, window);
          window.after.states[i] = state;
          window.after.outputs[i] = output;
        });
@@ -365,7 +366,8 @@ void LocalSteps::hand_back(std::span<const std::uint32_t> blocks, std::int64_t a
   prepare(at_ns, window.after.at_ns, window, inputs);
   step(blocks, std::numeric_limits<std::uint32_t>::max(), window.before, rays_, interval_, inputs,
        [&](std::uint32_t i, const SampleState& state, const SampleOutput& output) {
-         draw_line(i, at_ns, window.before.outputs[i].offset_k, window.after.at_ns, output, window);
+         draw_line(inputs.step.all.samples[i].vertex, at_ns, window.before.outputs[i].offset_k,
+                   window.after.at_ns, output, window);
          window.after.states[i] = state;
          window.after.outputs[i] = output;
        });
@@ -376,9 +378,10 @@ void LocalSteps::hand_back(std::span<const std::uint32_t> blocks, std::int64_t a
          window.next.outputs[i] = output;
          const std::uint32_t column = inputs.step.all.samples[i].column;
          if (column != kNoSample) window.stepped_again[column] = 1;
-         if (i >= window.next.vertices.size()) return;
-         window.next.vertices[i] = {output.offset_k, output.sun_frac};
-         window.next.changes.add(i, 1);
+         const std::uint32_t vertex = inputs.step.all.samples[i].vertex;
+         if (vertex == kNoSample) return;
+         window.next.vertices[vertex] = {output.offset_k, output.sun_frac};
+         window.next.changes.add(vertex, 1);
        });
   for (const std::uint32_t b : blocks) {
     state_[b] = State::of_interval;
@@ -417,11 +420,12 @@ void LocalSteps::rotated(const Window& window, const SurfaceSamples& all) noexce
         window.after.outputs[i] = window.before.outputs[i];
         window.before.states[i] = old.states[i];
         window.before.outputs[i] = old.outputs[i];
-        if (i >= window.before.vertices.size()) return;
-        const SampleVertex& now = window.before.vertices[i];
-        window.after.vertices[i] = {now.offset_k + ways * (now.offset_k - old.vertices[i].offset_k),
-                                    now.sun_frac};
-        window.after.changes.add(i, 1);
+        const std::uint32_t vertex = all.samples[i].vertex;
+        if (vertex == kNoSample) return;
+        const SampleVertex& now = window.before.vertices[vertex];
+        const float way_k = now.offset_k - old.vertices[vertex].offset_k;
+        window.after.vertices[vertex] = {now.offset_k + ways * way_k, now.sun_frac};
+        window.after.changes.add(vertex, 1);
       });
     }
   }

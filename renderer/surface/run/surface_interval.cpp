@@ -145,10 +145,11 @@ void SurfaceInterval::advance_samples(const SurfaceNode& from, SurfaceNode& to, 
   if (end <= first) return;
   SurfaceStep step = this->step(all);
   step.columns = &*columns_;
-  const auto keep = [&to](std::size_t i, const SampleState& state, const SampleOutput& output) {
+  const auto keep = [&](std::size_t i, const SampleState& state, const SampleOutput& output) {
     to.states[i] = state;
     to.outputs[i] = output;
-    if (i < to.vertices.size()) to.vertices[i] = {output.offset_k, output.sun_frac};
+    const std::uint32_t vertex = all.samples[i].vertex;
+    if (vertex != kNoSample) to.vertices[vertex] = {output.offset_k, output.sun_frac};
   };
   // Step the samples on all cores.
   workers.run(end - first, kSamplesPerTask, [&](std::size_t task_begin, std::size_t task_end) {
@@ -163,8 +164,18 @@ void SurfaceInterval::advance_samples(const SurfaceNode& from, SurfaceNode& to, 
     }
   });
   done_ = end;
-  const auto drawn = static_cast<std::uint32_t>(to.vertices.size());
-  to.changes.add(std::min(first, drawn), std::min(end, drawn) - std::min(first, drawn));
+  to.changes.add(std::min(first, to.drawn), std::min(end, to.drawn) - std::min(first, to.drawn));
+  // Twins have their values in the order of the samples.
+  const auto add_twins = [&](std::uint32_t side_begin, std::uint32_t side_end) {
+    const std::uint32_t begin = std::max(first, side_begin);
+    const std::uint32_t past = std::min(end, side_end);
+    if (begin >= past) return;
+    const std::uint32_t place = all.samples[begin].vertex;
+    to.changes.add(place, all.samples[past - 1].vertex + 1 - place);
+  };
+  const auto twins = static_cast<std::uint32_t>(all.twinned.size());
+  add_twins(all.first_twin, all.first_twin + twins);
+  add_twins(all.first_twin + twins, all.first_twin + 2 * twins);
 }
 
 }  // namespace emit::renderer

@@ -9,11 +9,13 @@
 namespace emit::renderer {
 
 void SurfaceNodes::begin(std::vector<SampleState> states, std::vector<SampleOutput> outputs,
-                         std::size_t drawn, std::span<const double> body_k, std::size_t bands) {
+                         const SurfaceSamples& all, std::uint32_t drawn,
+                         std::span<const double> body_k, std::size_t bands) {
   EMIT_CHECK_OP(states.size(), ==, outputs.size());
   ring_ = 0;
   for (SurfaceNode& node : nodes_) {
-    node.vertices.assign(drawn, {});
+    node.drawn = drawn;
+    node.vertices.assign((all.twinned.empty() ? 1 : 3) * std::size_t{drawn}, {});
     node.seen_w_m2_sr.assign(states.size() * bands, 0.0F);
     node.body_k.assign(body_k.begin(), body_k.end());
   }
@@ -40,7 +42,7 @@ void SurfaceNodes::rotate() noexcept {
 }
 
 void SurfaceNodes::cut(std::int64_t event_ns, std::int64_t end_ns, const LocalSteps& local,
-                       threads::WorkerPool& workers) noexcept {
+                       const SurfaceSamples& all, threads::WorkerPool& workers) noexcept {
   SurfaceNode& first = (*this)[0];
   SurfaceNode& second = (*this)[1];
   const auto fraction_at = [&](std::int64_t at_ns) {
@@ -61,10 +63,11 @@ void SurfaceNodes::cut(std::int64_t event_ns, std::int64_t end_ns, const LocalSt
         first.states[i] = between(first.states[i], second.states[i], frac);
         first.outputs[i] = between(first.outputs[i], second.outputs[i], frac);
       }
-      if (i >= first.vertices.size()) continue;
-      const SampleVertex from = first.vertices[i];
-      SampleVertex& to = second.vertices[i];
-      first.vertices[i] = {between(from.offset_k, to.offset_k, frac),
+      const std::uint32_t vertex = all.samples[i].vertex;
+      if (vertex == kNoSample) continue;
+      const SampleVertex from = first.vertices[vertex];
+      SampleVertex& to = second.vertices[vertex];
+      first.vertices[vertex] = {between(from.offset_k, to.offset_k, frac),
                            between(from.sun_frac, to.sun_frac, frac)};
       to.offset_k = between(from.offset_k, to.offset_k, end_frac);
     }
@@ -84,10 +87,9 @@ void SurfaceNodes::cut(std::int64_t event_ns, std::int64_t end_ns, const LocalSt
 }
 
 void SurfaceNodes::mark_changed(SurfaceNode& node) noexcept {
-  const auto drawn = static_cast<std::uint32_t>(node.vertices.size());
   forget_changes(node);
-  node.changes.add(0, drawn);
-  if (!node.seen_w_m2_sr.empty()) node.seen_changes.add(0, drawn);
+  node.changes.add(0, static_cast<std::uint32_t>(node.vertices.size()));
+  if (!node.seen_w_m2_sr.empty()) node.seen_changes.add(0, node.drawn);
 }
 
 void SurfaceNodes::mark_all_changed() noexcept {

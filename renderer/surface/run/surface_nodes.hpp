@@ -21,10 +21,11 @@ namespace emit::renderer {
 class SurfaceNodes {
  public:
   /// Makes node 0 of these states, outputs and interiors of bodies, and takes memory for the
-  /// others. The first `drawn` samples are vertices. Samples see others in `bands` bands, from 0
-  /// on. @pre states and outputs have equal sizes
-  void begin(std::vector<SampleState> states, std::vector<SampleOutput> outputs, std::size_t drawn,
-             std::span<const double> body_k, std::size_t bands);
+  /// others. The first `drawn` samples of `all` are drawn. Samples see others in `bands` bands, from
+  /// 0 on. @pre states and outputs have equal sizes
+  void begin(std::vector<SampleState> states, std::vector<SampleOutput> outputs,
+             const SurfaceSamples& all, std::uint32_t drawn, std::span<const double> body_k,
+             std::size_t bands);
 
   /// A node. @pre index < 3
   [[nodiscard]] SurfaceNode& operator[](std::size_t index) noexcept {
@@ -45,7 +46,7 @@ class SurfaceNodes {
   /// to `end_ns` along the same line; its states and outputs stay, because they are computed anew.
   /// Samples with a clock of their own keep their states.
   void cut(std::int64_t event_ns, std::int64_t end_ns, const LocalSteps& local,
-           threads::WorkerPool& workers) noexcept;
+           const SurfaceSamples& all, threads::WorkerPool& workers) noexcept;
 
   void mark_all_changed() noexcept;
   void forget_changes() noexcept;

@@ -194,6 +194,16 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
       drive_of(step, interval_rays, interval.entities, begin.outputs, viewed, offsets, sun);
   const glm::vec3 normal = interval_rays.normal(sample);
   BesideColumn beside;
+  double twin_change_k = 0.0;
+  if (sample.twin_of != kNoSample) {
+    // Neighbours warm a twin as much as the sample itself.
+    stepped.state.cells_k[0] = static_cast<float>(begin.states[sample.twin_of].aside_k());
+    const std::uint32_t column = step.all.samples[sample.twin_of].column;
+    if (column != kNoSample && step.columns != nullptr) {
+      twin_change_k = step.columns->expected_change_k(column);
+    }
+    drive.aside.change_k = twin_change_k;
+  }
   if (sample.column != kNoSample) {
     const SampleColumn& column = step.all.columns[sample.column];
     drive.aside.column = &column;
@@ -207,6 +217,7 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
   }
   if (sample.other_side == kNoSample) {
     stepped.output = step.heat.advance(sample, normal, interval, drive, stepped.state);
+    stepped.output.offset_k += static_cast<float>(twin_change_k);
     // Show the sun that static geometry leaves, because frames have their own shade of entities.
     stepped.output.sun_frac = sun.fixed_frac;
     return;

@@ -86,7 +86,7 @@ void visit_members(T& s, const Visit& visit) {
   visit(s.covered);
   visit(s.open_frac), visit(s.open_before_frac), visit(s.flat_m), visit(s.facet_m);
   visit(s.column);
-  visit(s.other_side);
+  visit(s.other_side), visit(s.vertex), visit(s.twin_of);
 }
 template <class T, class Visit>
 requires std::same_as<std::remove_const_t<T>, SampleState>
@@ -123,6 +123,8 @@ void put_model(Sink& sink, const SurfaceModel& model) {
   put_value(sink, model.samples.seen);
   put_value(sink, model.samples.columns);
   put_value(sink, model.samples.links);
+  put_value(sink, model.samples.twinned);
+  put_value(sink, model.samples.first_twin);
   put_value(sink, model.drawn_samples);
   put_value(sink, model.states);
   put_value(sink, model.outputs);
@@ -169,6 +171,28 @@ bool fits(const DrawnMesh& drawn, const scene::Mesh& whole) {
          std::ranges::all_of(levels.of_submesh, [&](const ClusterLevels::Range& range) {
            return range.first <= clusters && range.count <= clusters - range.first;
          });
+}
+
+/// Returns true if the drawn samples, and the twins behind them, stand where they say.
+bool twins_fit(const SurfaceModel& model) {
+  const SurfaceSamples& all = model.samples;
+  const std::size_t twins = all.twinned.size();
+  if (all.first_twin != model.drawn_samples ||
+      all.samples.size() != model.drawn_samples + 2 * twins) {
+    return false;
+  }
+  for (std::uint32_t s = 0; s < model.drawn_samples; ++s) {
+    if (all.samples[s].vertex != s || all.samples[s].twin_of != kNoSample) return false;
+  }
+  for (std::size_t k = 0; k < 2 * twins; ++k) {
+    const SurfaceSample& twin = all.samples[all.first_twin + k];
+    const std::uint32_t of = all.twinned[k % twins];
+    if (of >= model.drawn_samples || (k % twins > 0 && all.twinned[k % twins - 1] >= of) ||
+        twin.twin_of != of || twin.vertex != (1 + k / twins) * model.drawn_samples + of) {
+      return false;
+    }
+  }
+  return true;
 }
 
 /// Returns true if the arrays of a model fit each other and no index leads out of its array.
@@ -220,11 +244,14 @@ bool consistent(const SurfaceModel& model, const scene::SceneGeometry& geometry,
   // their arrays.
   const auto sides_fit = [&](const SurfaceSample& s) {
     return s.other_side == kNoSample ||
-           (s.other_side < model.drawn_samples && &all[s.other_side] != &s &&
+           (s.other_side < count && &all[s.other_side] != &s &&
             all[s.other_side].other_side < count && &all[all[s.other_side].other_side] == &s);
   };
+  const std::size_t materials =
+      geometry.materials.size() +
+      2 * static_cast<std::size_t>(std::ranges::count_if(geometry.materials, scene::varies_in_heat));
   const auto sample_fits = [&](const SurfaceSample& s) {
-    return sides_fit(s) && s.material < geometry.materials.size() && s.entity >= -1 &&
+    return sides_fit(s) && s.material < materials && s.entity >= -1 &&
            s.entity < static_cast<std::int64_t>(entities) && s.body >= -1 &&
            s.body < static_cast<std::int64_t>(model.body_k.size()) && s.first_seen <= seen &&
            s.seen_count <= seen - s.first_seen &&
@@ -240,7 +267,7 @@ bool consistent(const SurfaceModel& model, const scene::SceneGeometry& geometry,
     return l.column < columns.size() && l.cell < physics::kMaxColumnCells &&
            l.conductance_w_m2_k >= 0.0F;
   };
-  return std::ranges::all_of(model.samples.samples, sample_fits) &&
+  return std::ranges::all_of(model.samples.samples, sample_fits) && twins_fit(model) &&
          std::ranges::all_of(columns, column_fits) &&
          std::ranges::all_of(model.samples.links, link_fits) &&
          std::ranges::all_of(model.samples.seen,
@@ -415,6 +442,8 @@ Result<SurfaceModel> read_state(const std::filesystem::path& file, const StateWa
   take_value(source, model.samples.seen);
   take_value(source, model.samples.columns);
   take_value(source, model.samples.links);
+  take_value(source, model.samples.twinned);
+  take_value(source, model.samples.first_twin);
   take_value(source, model.drawn_samples);
   take_value(source, model.states);
   take_value(source, model.outputs);

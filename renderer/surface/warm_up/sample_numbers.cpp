@@ -167,6 +167,7 @@ void Numbers::append(const SurfacePatch& side, std::size_t vertex, SurfaceSample
   // Scale the weights so that the faces fill the part of the hemisphere that is not open.
   const float left_frac = 1.0F - sample.sky_frac - sample.far_frac;
   sample.seen_scale = view.count != 0 ? left_frac / view.weight_frac : 0.0F;
+  sample.vertex = static_cast<std::uint32_t>(model_.samples.samples.size());
   model_.samples.samples.push_back(sample);
 }
 

@@ -16,6 +16,7 @@
 #include "surface/model/body_nodes.hpp"
 #include "surface/model/surface_model.hpp"
 #include "surface/rays/ray_offsets.hpp"
+#include "surface/warm_up/clutter_twins.hpp"
 #include "surface/warm_up/facet_edges.hpp"
 #include "surface/warm_up/sample_numbers.hpp"
 #include "surface/warm_up/surface_columns.hpp"
@@ -347,13 +348,25 @@ void Builder::replace_covered() {
         }
       }
     }
-    // Copy the open ones.
+    // Copy the open ones, and their twins, to the places of the covered ones.
+    const auto copy = [&](std::uint32_t to, std::uint32_t from) {
+      const std::uint32_t vertex = all.samples[to].vertex;
+      const std::uint32_t twin_of = all.samples[to].twin_of;
+      all.samples[to] = all.samples[from];
+      all.samples[to].vertex = vertex;
+      all.samples[to].twin_of = twin_of;
+      all.samples[to].column = kNoSample;
+      model_.states[to] = model_.states[from];
+      model_.outputs[to] = model_.outputs[from];
+    };
     for (std::uint32_t v = 0; v < open.size(); ++v) {
       if (open[v] == kNoSample) continue;
-      all.samples[first + v] = all.samples[first + open[v]];
-      all.samples[first + v].column = kNoSample;
-      model_.states[first + v] = model_.states[first + open[v]];
-      model_.outputs[first + v] = model_.outputs[first + open[v]];
+      copy(first + v, first + open[v]);
+      const SampleTwins to = twins_of(all, first + v);
+      const SampleTwins from = twins_of(all, first + open[v]);
+      if (to.low == kNoSample || from.low == kNoSample) continue;
+      copy(to.low, from.low);
+      copy(to.high, from.high);
     }
   }
 }
@@ -449,6 +462,7 @@ physics::Result<SurfaceModel> Builder::run() {
     return report(kEvaluatedFrac + (1.0 - kEvaluatedFrac) * frac);
   };
   SampleHistories histories = take_histories(in_, std::move(patches_), model_);
+  add_twins(in_, histories, model_);
   if (sampler_.keeps_sent()) {
     const ExchangeOptions exchange_options{.exitance = options_.exchange};
     if (!exchange(in_, exchange_options, std::move(histories), model_, exchanged)) return stopped();

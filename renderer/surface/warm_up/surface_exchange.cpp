@@ -22,6 +22,8 @@ namespace {
 /// Groups of samples in one task of a parallel loop.
 constexpr std::size_t kGrain = 8;
 constexpr std::uint32_t kNoList = 0xffffffffU;
+/// Entry of Sweeper::kinds_ that stands for twins.
+constexpr std::uint32_t kTwins = 0xffffffffU;
 /// Intervals in a window: short enough that the radiation within it settles in few iterations and
 /// that its rows stay in the cache, long enough that sums over rows run at full width.
 constexpr std::size_t kWindow = 16;
@@ -238,9 +240,17 @@ class Sweeper {
   void begin_columns(std::size_t group, const Window& window, std::size_t k) noexcept;
   /// Takes over what the columns of a group agree on at the end of interval k of a window.
   void end_columns(std::size_t group, const Window& window, std::size_t k) noexcept;
+  /// Integrates the twins of a group over a window, once the radiation in it has settled. Nobody
+  /// receives what they send.
+  void carry_twins(std::size_t group, const Window& window);
+  /// Returns what neighbours add to the surface of the sample of a twin at the begin of interval k.
+  [[nodiscard]] double aside_of_k(const SurfaceSample& twin, std::size_t k) const noexcept;
+  [[nodiscard]] bool has_twins(std::size_t group) const noexcept {
+    return kinds_[bodies_->groups()[group].first] == kTwins;
+  }
   /// Island of a group; kNoList if its samples have no columns.
   [[nodiscard]] std::uint32_t island(std::size_t group) const noexcept {
-    return kinds_[bodies_->groups()[group].first] - 1;
+    return has_twins(group) ? kNoList : kinds_[bodies_->groups()[group].first] - 1;
   }
   [[nodiscard]] std::uint32_t column(std::uint32_t s) const noexcept {
     return model_.samples.samples[s].column;
@@ -256,7 +266,8 @@ class Sweeper {
   std::size_t intervals_;
   std::vector<std::uint32_t> swept_;  ///< samples that change; one for both faces of a sheet
   std::vector<SentRow> rows_;         ///< by sample: what it sent in the latest pass
-  std::vector<std::uint32_t> kinds_;  ///< by entry of `swept_`: 1 + island of its column, or 0
+  /// By entry of `swept_`: 1 + island of its column, or 0; kTwins for twins, which come last.
+  std::vector<std::uint32_t> kinds_;
   std::vector<float> sent_;           ///< by sample: its row in the window at hand
   std::vector<float> shift_w_m2_;     ///< by sample: long wave at the last node above its guess
   std::vector<SampleState> begin_;    ///< by sample: state at the begin of the window
@@ -309,6 +320,7 @@ Sweeper::Sweeper(const SurfaceInputs& inputs, const ExchangeOptions& options,
     takes_courses_ = takes_courses_ || takes_course(s);
   }
   const auto kind = [&](std::uint32_t s) {
+    if (all[s].twin_of != kNoSample) return kTwins;
     return column(s) == kNoSample ? 0 : 1 + columns_.island(column(s));
   };
   std::ranges::stable_sort(swept_, {}, kind);
@@ -337,7 +349,15 @@ bool Sweeper::sweep(Pass pass, const SurfaceProgress& report) {
     std::ranges::fill(needed_, std::uint8_t{0});
     carry_groups(window, [&](std::uint32_t s) { return pass != Pass::courses || takes_course(s); });
     march(window);
-    if (pass == Pass::settle && !settle(window, within)) return false;
+    if (pass == Pass::settle) {
+      if (!settle(window, within)) return false;
+      threads::parallel_parts(bodies_->groups().size(), kGrain,
+                              [&](std::size_t from, std::size_t to) {
+                                for (std::size_t group = from; group < to; ++group) {
+                                  if (has_twins(group)) carry_twins(group, window);
+                                }
+                              });
+    }
     store(window);
   }
   take_courses();
@@ -403,10 +423,11 @@ void Sweeper::store(const Window& window) {
         }
       };
       const std::uint32_t s = swept_[i];
+      begin_[s] = model_.states[s];
+      if (model_.samples.samples[s].twin_of != kNoSample) continue;
       keep(s);
       const std::uint32_t other = model_.samples.samples[s].other_side;
       if (other != kNoSample) keep(other);
-      begin_[s] = model_.states[s];
     }
   });
 }
@@ -440,7 +461,10 @@ double Sweeper::measure_faces(const Window& window) {
 
 bool Sweeper::alone(std::size_t s) const noexcept {
   const SurfaceSample& sample = model_.samples.samples[s];
-  if (sample.seen_count != 0 || sample.body >= 0 || sample.column != kNoSample) return false;
+  if (sample.seen_count != 0 || sample.body >= 0 || sample.column != kNoSample ||
+      sample.twin_of != kNoSample) {
+    return false;
+  }
   if (entities_ == 0) return true;
   return std::ranges::all_of(histories_.rows[s].hidden_sky,
                              [](const HiddenSky& sky) { return sky.frac == 0.0F; });
@@ -458,6 +482,7 @@ template <class Chosen>
 void Sweeper::carry_groups(const Window& window, const Chosen& chosen) {
   const std::span<const BodyCourses::Group> groups = bodies_->groups();
   const auto needed = [&](std::size_t group) {
+    if (has_twins(group)) return false;
     const auto samples = std::span(swept_).subspan(groups[group].first, groups[group].count);
     return std::ranges::any_of(samples, [&](std::uint32_t s) {
       const std::uint32_t other = model_.samples.samples[s].other_side;
@@ -753,6 +778,64 @@ void Sweeper::carry(std::size_t group, const Window& window) {
     if (other == kNoSample) continue;
     model_.states[other] = states[i];
     model_.outputs[other] = back_outputs[i];
+  }
+}
+
+double Sweeper::aside_of_k(const SurfaceSample& twin, std::size_t k) const noexcept {
+  const std::uint32_t column = model_.samples.samples[twin.twin_of].column;
+  if (column == kNoSample) return 0.0;
+  const std::array<float, kWindow>& change_k = fronts_[column].known_change_k;
+  double sum_k = begin_[twin.twin_of].aside_k();
+  for (std::size_t j = 0; j < k; ++j) sum_k += static_cast<double>(change_k[j]);
+  return sum_k;
+}
+
+void Sweeper::carry_twins(std::size_t group, const Window& window) {
+  const BodyCourses::Group& chosen = bodies_->groups()[group];
+  const std::vector<SurfaceSample>& all = model_.samples.samples;
+  std::array<SampleAdvance, kAdvanceTogether> fronts;
+  std::array<SampleState, kAdvanceTogether> states;
+  std::array<SampleDrive, kAdvanceTogether> back_drives;
+  std::array<std::optional<SheetBack>, kAdvanceTogether> backs;
+  for (std::size_t i = 0; i < chosen.count; ++i) {
+    const std::uint32_t s = swept_[chosen.first + i];
+    states[i] = begin_[s];
+    fronts[i].sample = &all[s];
+    fronts[i].state = &states[i];
+    if (all[s].other_side == kNoSample) continue;
+    backs[i].emplace(SheetBack{all[all[s].other_side], back_drives[i]});
+    fronts[i].back = &*backs[i];
+  }
+  for (std::size_t k = 0; k < window.count; ++k) {
+    const std::size_t j = window.first + k;
+    for (std::size_t i = 0; i < chosen.count; ++i) {
+      const std::uint32_t s = swept_[chosen.first + i];
+      SampleAdvance& front = fronts[i];
+      front.normal = in_.record.rays[j].normal(*front.sample);
+      front.drive = drive(s, front.normal, window, k);
+      // Neighbours warm a twin as much as the sample itself.
+      const double aside_k = aside_of_k(*front.sample, k);
+      states[i].cells_k[0] = static_cast<float>(aside_k);
+      front.drive.aside.change_k = aside_of_k(*front.sample, k + 1) - aside_k;
+      if (front.back != nullptr) {
+        back_drives[i] = drive(front.sample->other_side, -front.normal, window, k);
+      }
+    }
+    in_.heat.advance_all(std::span(fronts).first(chosen.count), in_.record.intervals[j]);
+  }
+  const std::size_t last = window.first + window.count - 1;
+  const SurfaceForcing& end = in_.record.intervals[last].forcing.end;
+  for (std::size_t i = 0; i < chosen.count; ++i) {
+    const std::uint32_t s = swept_[chosen.first + i];
+    states[i].cells_k[0] = static_cast<float>(aside_of_k(all[s], window.count));
+    model_.states[s] = states[i];
+    model_.outputs[s] =
+        in_.heat.output(all[s], fronts[i].normal, end, fronts[i].drive, states[i]);
+    const std::uint32_t other = all[s].other_side;
+    if (other == kNoSample) continue;
+    model_.states[other] = states[i];
+    model_.outputs[other] =
+        in_.heat.output(all[other], -fronts[i].normal, end, back_drives[i], states[i]);
   }
 }
 

@@ -111,10 +111,10 @@ class PatchSampler {
                const SurfaceModelOptions& options);
 
   [[nodiscard]] const SunTracer& tracer() const noexcept { return tracer_; }
-  /// Returns true if samples exchange heat with others or with the interior of their body, so that
-  /// the histories of their output are needed.
+  /// Returns true if samples exchange heat with others or with the interior of their body, or have
+  /// twins, so that the histories of their output are needed.
   [[nodiscard]] bool keeps_sent() const noexcept {
-    return options_.exchange || options_.lateral || in_.heat.has_bodies();
+    return options_.exchange || options_.lateral || in_.heat.has_bodies() || in_.heat.has_twins();
   }
 
   /// Start state of the latest sample. Neighbours face alike and start with the same state. Each

@@ -6,6 +6,7 @@
 namespace emit::tool {
 
 void add_bench_budget(CommandLine& bench);
+void add_bench_clutter(CommandLine& bench);
 void add_bench_crowd(CommandLine& bench);
 void add_bench_gas(CommandLine& bench);
 void add_bench_live(CommandLine& bench);

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "emit/physics/check.hpp"
+#include "tool/support/progress.hpp"
 #include "tool/support/scenario_input.hpp"
-#include "tool/support/statistics.hpp"
 
 namespace emit::tool {
 namespace {
@@ -100,6 +100,46 @@ PairedRatio paired_ratio(std::span<const double> a_ms, std::span<const double> t
   for (std::size_t i = 0; i < 3; ++i) {
     const double part = median(std::span(self).subspan(i * third, third));
     out.self_spread = std::max(out.self_spread, std::abs(part - 1.0));
+  }
+  return out;
+}
+
+Result<VariantResult> compare_variants(const scene::ScenarioDesc& plain,
+                                       std::span<const SceneVariant> variants,
+                                       const VariantOptions& options) {
+  const auto runner_of = [&](const scene::ScenarioDesc& scenario, std::uint32_t first_frame) {
+    auto runner = SceneRunner::start(scenario, SceneRunner::kSettleFrames, options.gpu_index);
+    if (runner) runner->skip_to(first_frame);
+    return runner;
+  };
+  Progress progress(options.label, variants.size());
+  // The plain scene and its twin are the same for all variants.
+  std::vector<SceneRunner> still;
+  for (int i = 0; i < 2; ++i) {
+    auto runner =
+        runner_of(plain, static_cast<std::uint32_t>(options.time_s * SceneRunner::kRateHz));
+    if (!runner) return tl::unexpected(std::move(runner.error()));
+    still.push_back(std::move(*runner));
+  }
+  VariantResult out;
+  out.device = still[0].device();
+  for (std::size_t i = 0; i < variants.size(); ++i) {
+    progress.advance_to(i + 1);
+    auto runner = runner_of(variants[i].scenario, still[0].next_frame());
+    if (!runner) return tl::unexpected(std::move(runner.error()));
+    const auto rounds = take_turns({&still[0], &still[1], &*runner}, options.pairs);
+    if (!rounds) return tl::unexpected(rounds.error());
+    const auto& [plain_ms, twin_ms, with_ms] = *rounds;
+    if (i == 0) {
+      VariantTimes& alone = out.times.emplace_back();
+      for (const double ms : plain_ms) alone.frame_ms.add(ms);
+      alone.pairs = {.pairs = plain_ms.size(), .ratio = 1.0, .self_ratio = 1.0};
+      alone.warm_up_s = still[0].warm_up_s();
+    }
+    VariantTimes& times = out.times.emplace_back();
+    for (const double ms : with_ms) times.frame_ms.add(ms);
+    times.pairs = paired_ratio(plain_ms, twin_ms, with_ms);
+    times.warm_up_s = runner->warm_up_s();
   }
   return out;
 }

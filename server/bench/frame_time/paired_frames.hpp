@@ -11,6 +11,7 @@
 #include "emit/physics/error.hpp"
 #include "emit/scene/scene_desc.hpp"
 #include "tool/support/renderer_thread.hpp"
+#include "tool/support/statistics.hpp"
 
 /// Frame times of scenes that are shown in turn, so that drifts of the machine affect them alike.
 namespace emit::tool {
@@ -76,5 +77,32 @@ struct PairedRatio {
 [[nodiscard]] PairedRatio paired_ratio(std::span<const double> a_ms,
                                        std::span<const double> twin_ms,
                                        std::span<const double> b_ms);
+
+/// A scene that has something in addition to another one.
+struct SceneVariant {
+  std::string name;
+  scene::ScenarioDesc scenario;
+};
+/// Frame times of a variant beside the scene that it adds to.
+struct VariantTimes {
+  Samples frame_ms;
+  PairedRatio pairs;
+  double warm_up_s = 0.0;
+};
+/// Times of the plain scene, then of each variant.
+struct VariantResult {
+  std::string device;
+  std::vector<VariantTimes> times;
+};
+struct VariantOptions {
+  const char* label = "";  ///< of the progress
+  double time_s = 0.0;     ///< simulation time of the first frame
+  std::uint32_t pairs = 45;
+  int gpu_index = -1;
+};
+/// Shows the plain scene, its twin and each variant in turn. Errors: those of the renderer.
+[[nodiscard]] physics::Result<VariantResult> compare_variants(
+    const scene::ScenarioDesc& plain, std::span<const SceneVariant> variants,
+    const VariantOptions& options);
 
 }  // namespace emit::tool

@@ -352,6 +352,11 @@ int run(const SolveOptions& command) {
   scene::adopt_sheets(*geometry);
   for (const std::string& text : scenario->warnings) warn(text);
   for (const std::string& text : geometry->warnings) warn(text);
+  if (std::ranges::any_of(scenario->materials, [](const scene::Material& material) {
+        return material.clutter.has_value();
+      })) {
+    warn("[[clutter]] is ignored by emit solve: materials are those of its mean");
+  }
   if (!scenario->gas.empty()) warn("plumes, flares, smoke and fires are not drawn by emit solve");
   std::optional<tbb::global_control> threads;
   if (command.threads > 0) {

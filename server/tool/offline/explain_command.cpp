@@ -72,6 +72,8 @@ Result<void> explain_frame(const scene::ScenarioDesc& scenario, const ProbeFinde
           "has no history");
     }
     surface.temperature_k = static_cast<double>(view.temperature_k[i]);
+    surface.clutter_sd = static_cast<double>(view.clutter_sd[i]);
+    surface.clutter_k = static_cast<double>(view.clutter_k[i]);
     surface.sky_frac = static_cast<double>(view.sky_frac[i]);
     surface.sun_cosine = static_cast<double>(view.sun_cosine[i]);
     found.surface = surface;
@@ -126,6 +128,8 @@ Result<Explanation> explain(const ExplainOptions& command, scene::ScenarioDesc s
   for (int i = 0; i <= steps; ++i) {
     times_s.push_back(std::lerp(first_s, command.time_s, double{1} * i / steps));
   }
+  // The history is that of the mean material: what the clutter adds is known for this pixel alone.
+  for (scene::Material& material : scenario.materials) material.clutter.reset();
   ProbeRun run(scenario, std::move(times_s),
                {finder->follow(*place, std::llround(1e9 * command.time_s), pixel.name)});
   if (auto done = run.run(*finder, command.gpu_index); !done) {
@@ -134,7 +138,9 @@ Result<Explanation> explain(const ExplainOptions& command, scene::ScenarioDesc s
   // The history is seen along the normal. Beside an edge the two pictures differ.
   constexpr double kSameK = 0.5;
   const double last_k = run.rows().back().temperature_k;
-  if (found.surface && !(std::abs(last_k - found.surface->temperature_k) <= kSameK)) {
+  const double clutter_k = found.surface ? found.surface->clutter_k : 0.0;
+  if (found.surface &&
+      !(std::abs(last_k + clutter_k - found.surface->temperature_k) <= kSameK)) {
     warn(fmt::format(
         "the pixel lies beside an edge: it shows {:.3f} K, its history ends at {:.3f} K",
         found.surface->temperature_k, last_k));

@@ -34,6 +34,8 @@ struct ExplainedSurface {
   double temperature_k = 0.0;
   double sky_frac = 0.0;
   double sun_cosine = 0.0;  ///< with the visible share of the sun
+  double clutter_sd = 0.0;  ///< mean of the clutter's field over the pixel
+  double clutter_k = 0.0;   ///< part of temperature_k
 };
 
 struct Explanation {

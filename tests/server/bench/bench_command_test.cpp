@@ -92,6 +92,19 @@ TEST(CliBench, ACrowdIsMeasuredBesideTheSceneWithoutIt) {
   EXPECT_EQ(numbers_of(json, "frame_ms_median").size(), 2U);
 }
 
+TEST(CliBench, ClutterIsMeasuredBesideEvenMaterials) {
+  const TemporaryFolder folder;
+  const ProcessResult run = run_emit(
+      {"bench", "clutter", "--scenario", "box", "--pairs", "15", "--set", "thermal.tolerance_k=50",
+       "--set", "thermal.steps=3", "--set", "thermal.history_start_s=-600", "--set",
+       "sensor.width_px=64", "--set", "sensor.height_px=48", "--json", folder.file("c.json")});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const std::string json = read_text(folder.file("c.json"));
+  EXPECT_EQ(json_value(json, "suite"), "\"clutter\"");
+  EXPECT_EQ(numbers_of(json, "ratio").size(), 3U);
+  for (const double ms : numbers_of(json, "frame_ms_median")) EXPECT_GT(ms, 0.0);
+}
+
 TEST(CliBench, GasIsMeasuredBesideTheSceneWithoutIt) {
   const TemporaryFolder folder;
   const ProcessResult run = run_emit(

@@ -94,6 +94,7 @@ const std::vector<OutputCase>& output_cases() {
     add({"bench", "thermal-truth"}, {"--json"}, {"--pictures"});
     add({"bench", "scaling"}, {"--json"});
     add({"bench", "crowd"}, {"--json"});
+    add({"bench", "clutter"}, {"--json"});
     add({"bench", "gas"}, {"--json"});
     add({"bench", "uncertainty"}, {"--json", "--plot"});
     add({"bench", "turn"}, {"--json"});

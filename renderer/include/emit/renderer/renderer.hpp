@@ -149,10 +149,15 @@ struct FrameView {
   std::span<const float> sun_cosine;                     ///< empty unless asked for
   std::span<const float> sky_frac;                       ///< empty unless asked for
   /// Radiance that arrives at the surface from everything but the sun, one plane per band, the
-  /// material, and of glossy surfaces the normal (east, north, up) and the sun's light that facets
-  /// without loss would reflect, per irradiance (0 elsewhere). Empty unless OutputOptions::terms.
+  /// material, its clutter (mean of the field over the pixel, what it adds to the temperature, and
+  /// the variance of the temperature within the pixel), and of glossy surfaces the normal (east,
+  /// north, up) and the sun's light that facets without loss would reflect, per irradiance (0
+  /// elsewhere). Empty unless OutputOptions::terms.
   std::vector<std::span<const float>> incoming_w_m2_sr;
   std::span<const float> material;
+  std::span<const float> clutter_sd;
+  std::span<const float> clutter_k;
+  std::span<const float> clutter_variance_k2;
   std::array<std::span<const float>, 3> normal;
   std::span<const float> glint_per_sr;
   std::span<const float> coverage_frac;  ///< empty unless asked for

@@ -58,6 +58,9 @@ struct FosterMaterial {
   /// Layers in which heat moves sideways; empty for sheets and for prescribed temperatures.
   std::vector<physics::StackLayer> layers;
   physics::FosterState<double> base_shares{};  ///< shares c_i of the modes in a change of the base
+  /// Index of the first of its two twins, which have the properties where the clutter's field is
+  /// -kTwinSd and +kTwinSd; 0: none.
+  std::uint32_t first_twin = 0;
 
   [[nodiscard]] bool prescribed() const noexcept { return network.count == 0; }
 };

@@ -15,6 +15,7 @@
 #include "emit/physics/frames.hpp"
 #include "emit/physics/weather.hpp"
 #include "emit/scene/channel_output.hpp"
+#include "emit/scene/clutter_desc.hpp"
 #include "emit/scene/gas_desc.hpp"
 #include "emit/scene/gloss.hpp"
 
@@ -152,6 +153,7 @@ struct Material {
   /// True for both faces of a thin body, whose layers are half of it over an insulated middle (see
   /// sheets.hpp). Then base_k counts for emit2014 only.
   bool sheet = false;
+  std::optional<Clutter> clutter;        ///< variation from place to place; absent: none
   std::string family;                    ///< kind of material, for lists; empty: none
   std::string source;                    ///< origin of the numbers
   std::optional<MaterialSpread> spread;  ///< known error of the numbers
@@ -163,6 +165,11 @@ struct Material {
     return base == BaseKind::body && !base_stated && !prescribed_k && !sheet;
   }
 };
+
+/// Returns whether the clutter of a material changes its temperature from place to place.
+[[nodiscard]] inline bool varies_in_heat(const Material& material) noexcept {
+  return material.clutter && material.clutter->changes_heat() && !material.prescribed_k;
+}
 
 /// Returns how a material gives water to the air; dry if it states nothing or has a prescribed
 /// temperature.

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <span>
+#include <vector>
+
+#include "draw/draw_lists.hpp"
+#include "emit/physics/error.hpp"
+#include "emit/scene/scene_desc.hpp"
+#include "gl/objects.hpp"
+
+namespace emit::renderer {
+
+/// Fields of the clutter of a scene on the device (passes/clutter.glsl), one below the other in a
+/// texture. Owner: Renderer. Thread: the one that owns the GL context. Real time: build() is setup
+/// only, the rest is RT-safe.
+class ClutterFields {
+ public:
+  /// Largest number of materials with clutter: every OpenGL 4.5 device takes textures that high.
+  static constexpr std::size_t kMost = 16384 / (EMIT_CLUTTER_SIDE + EMIT_CLUTTER_SIDE / 2);
+
+  /// Makes the field of each material with clutter. Errors: config (more than kMost of them).
+  [[nodiscard]] static physics::Result<ClutterFields> build(
+      std::span<const scene::Material> materials);
+
+  [[nodiscard]] bool empty() const noexcept { return texture_.id() == 0; }
+  /// How draws of each material use the fields.
+  [[nodiscard]] std::span<const DrawnClutter> of_materials() const noexcept { return drawn_; }
+  void bind() const noexcept { texture_.bind(EMIT_TEX_CLUTTER); }
+
+ private:
+  std::vector<DrawnClutter> drawn_;
+  gl::Texture texture_;
+};
+
+}  // namespace emit::renderer
