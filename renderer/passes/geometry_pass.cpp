@@ -94,6 +94,11 @@ physics::Result<GeometryPass> GeometryPass::create(const gl::EglContext& context
   }
   if (objects) defines.push_back({"EMIT_OBJECTS", "1"});
   if (setup.clutter) defines.push_back({"EMIT_CLUTTER", "1"});
+  const bool normals = sampled && setup.normal;
+  if (normals) {
+    const int place = 2 + (objects ? 1 : 0) + (setup.clutter ? 1 : 0);
+    defines.push_back({"EMIT_NORMAL", fmt::format("{}", place)});
+  }
   if (setup.shade == Shade::of_entities) defines.push_back({"EMIT_SHADE", "1"});
   auto program = gl::Program::graphics("passes/geometry.vert", "passes/geometry.frag", defines);
   if (!program) return tl::unexpected(std::move(program.error()));
@@ -115,11 +120,18 @@ physics::Result<GeometryPass> GeometryPass::create(const gl::EglContext& context
       glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT2, pass.ids_.id(), 0);
     }
     GLsizei count = objects ? 3 : 2;
-    constexpr std::array<GLenum, 4> kTargets{GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1,
-                                             GL_COLOR_ATTACHMENT2, GL_COLOR_ATTACHMENT3};
+    constexpr std::array<GLenum, 5> kTargets{GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1,
+                                             GL_COLOR_ATTACHMENT2, GL_COLOR_ATTACHMENT3,
+                                             GL_COLOR_ATTACHMENT4};
     if (setup.clutter) {
       pass.clutter_ = gl::Texture(GL_RGBA32UI, width, height);
       glNamedFramebufferTexture(id, kTargets[static_cast<std::size_t>(count)], pass.clutter_.id(),
+                                0);
+      ++count;
+    }
+    if (normals) {
+      pass.normal_ = gl::Texture(GL_RG16_SNORM, width, height);
+      glNamedFramebufferTexture(id, kTargets[static_cast<std::size_t>(count)], pass.normal_.id(),
                                 0);
       ++count;
     }
@@ -195,6 +207,7 @@ void GeometryPass::bind_textures() const noexcept {
     incoming_.bind(EMIT_TEX_INCOMING);
     glBindImageTexture(EMIT_IMG_SURFACE, surface_.id(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RG32UI);
     if (ids_.id() != 0) ids_.bind(EMIT_TEX_IDS);
+    if (normal_.id() != 0) normal_.bind(EMIT_TEX_NORMAL);
     if (clutter_.id() != 0) clutter_.bind(EMIT_TEX_CLUTTER_PIXELS);
     return;
   }

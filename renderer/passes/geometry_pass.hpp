@@ -36,6 +36,7 @@ class GeometryPass {
     Content content = Content::normals;
     Shade shade = Shade::none;
     std::uint32_t bands = 1;  ///< of the incoming radiance that samples have
+    bool normal = false;      ///< samples have normals too, because something is glossy
     bool seen = false;        ///< vertices of samples have SceneVertexArrays::read_seen
     bool clutter = false;     ///< some materials vary: vertices have SceneVertexArrays::read_twins
   };

@@ -25,6 +25,9 @@ physics::Result<RadiancePass> RadiancePass::create(const scene::ThermalOptions& 
                                   {"EMIT_TERMS", fmt::format("{}", content.terms)},
                                   {"EMIT_OUTPUTS", fmt::format("{}u", content.outputs)},
                                   rows_define(pass.rows_)};
+  if (content.first_lobe != 0) {
+    defines.push_back({"EMIT_LOBES", fmt::format("{}", content.first_lobe)});
+  }
   if (content.clutter) defines.push_back({"EMIT_CLUTTER", "1"});
   if (content.clutter_emissivity) defines.push_back({"EMIT_CLUTTER_EMISSIVITY", "1"});
   if (options.model == scene::ThermalModel::foster) defines.push_back({"EMIT_FOSTER", "1"});

@@ -16,8 +16,10 @@ struct RadianceContent {
   std::uint32_t air_table = 0;  ///< bit per band: its air is a table
   std::uint32_t air_model = 0;  ///< bit per band: its air is built in
   std::uint32_t terms = 0;      ///< largest number of exponential terms of a band
-  std::uint32_t outputs = 0;    ///< planes behind those of the bands, EMIT_OUTPUT_*
-  bool clutter = false;         ///< some materials vary from place to place
+  /// Index of the first number of the lobes in the buffer of the tables; 0: nothing is glossy.
+  std::uint32_t first_lobe = 0;
+  std::uint32_t outputs = 0;        ///< planes behind those of the bands, EMIT_OUTPUT_*
+  bool clutter = false;             ///< some materials vary from place to place
   bool clutter_emissivity = false;  ///< the emissivity of some does
 };
 

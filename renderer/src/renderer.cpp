@@ -32,8 +32,8 @@
 #include "passes/target_pass.hpp"
 #include "stages/band_model.hpp"
 #include "stages/cached_stage.hpp"
-#include "stages/frame_setup.hpp"
 #include "stages/clutter_fields.hpp"
+#include "stages/frame_setup.hpp"
 #include "stages/gas_model.hpp"
 #include "stages/per_frame_stage.hpp"
 
@@ -55,7 +55,7 @@ static_assert(EMIT_MAX_ATMOSPHERE_TERMS == limits::kMaxAtmosphereTerms);
 constexpr std::size_t kBlockAlignment = 256;
 /// Largest number of planes: radiance of all bands, temperature, depth, object, sun, sky, what
 /// arrives in all bands, material, coverage.
-constexpr std::size_t kMaxPlanes = 2 * EMIT_MAX_BANDS + 10;
+constexpr std::size_t kMaxPlanes = 2 * EMIT_MAX_BANDS + 14;
 
 /// Checks the limits of the renderer. Errors: config, naming the value and the limit.
 Result<void> check_limits(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
@@ -253,6 +253,7 @@ RadianceContent radiance_content(const BandModel& bands, const ClutterFields& cl
           .air_table = bands.air_table(),
           .air_model = bands.air_model(),
           .terms = bands.max_terms(),
+          .first_lobe = bands.first_lobe(),
           .outputs = (output.temperature ? EMIT_OUTPUT_TEMPERATURE : 0U) |
                      (output.depth ? EMIT_OUTPUT_DEPTH : 0U) |
                      (output.object ? EMIT_OUTPUT_OBJECT : 0U) |
@@ -272,7 +273,7 @@ bool has_entities(const scene::ScenarioDesc& scenario) {
 std::size_t surface_planes(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
   return scenario.bands.size() + (output.temperature ? 1U : 0U) + (output.depth ? 1U : 0U) +
          (output.object ? 1U : 0U) + (output.sun ? 1U : 0U) + (output.sky ? 1U : 0U) +
-         (output.terms ? scenario.bands.size() + 4 : 0U);
+         (output.terms ? scenario.bands.size() + 8 : 0U);
 }
 
 /// Number of planes of the output image.
@@ -368,6 +369,8 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
       view.clutter_sd = next_plane();
       view.clutter_k = next_plane();
       view.clutter_variance_k2 = next_plane();
+      for (std::span<const float>& plane_of_axis : view.normal) plane_of_axis = next_plane();
+      view.glint_per_sr = next_plane();
     }
     if (output_.coverage) view.coverage_frac = next_plane();
   }
@@ -532,6 +535,10 @@ std::vector<RadianceTerms> GlRenderer::radiance_terms(const FrameView& view, con
   seen.range_m = view.depth_m[i] * glm::length(ray);
   seen.sin_elevation = glm::dot(up, ray) / glm::length(ray);
   seen.sensor_height_m = frame_params_.sensor_height_m;
+  seen.normal = {view.normal[0][i], view.normal[1][i], view.normal[2][i]};
+  seen.to_viewer = -glm::normalize(glm::mat3(frame_params_.relworld_from_sensor) * ray);
+  seen.to_sun = frame_params_.to_sun;
+  seen.glint_per_sr = view.glint_per_sr[i];
   seen.clutter_sd = view.clutter_sd[i];
   seen.clutter_variance_k2 = view.clutter_variance_k2[i];
   std::vector<RadianceTerms> out;
@@ -547,8 +554,10 @@ std::vector<RadianceTerms> GlRenderer::radiance_terms(const FrameView& view, con
     RadianceTerms& terms = out[b];
     terms.gas_frac = gas.through_frac[b];
     terms.gas_w_m2_sr = gas.added_w_m2_sr[b];
-    for (double* part : {&terms.emission_w_m2_sr, &terms.sky_w_m2_sr, &terms.neighbours_w_m2_sr,
-                         &terms.sun_w_m2_sr, &terms.path_w_m2_sr}) {
+    for (double* part :
+         {&terms.emission_w_m2_sr, &terms.sky_w_m2_sr, &terms.neighbours_w_m2_sr,
+          &terms.sun_w_m2_sr, &terms.lobe_sky_w_m2_sr, &terms.lobe_neighbours_w_m2_sr,
+          &terms.glint_w_m2_sr, &terms.path_w_m2_sr}) {
       *part *= terms.gas_frac;
     }
   }
@@ -558,7 +567,7 @@ std::vector<RadianceTerms> GlRenderer::radiance_terms(const FrameView& view, con
 void GlRenderer::upload_frame() noexcept {
   frame_buffer_.upload(std::span<const gpu::FrameParams>(&frame_params_, 1));
   band_buffer_.upload(bands_.params());
-  if (bands_.air_model() != 0) air_buffer_.upload(bands_.air_nodes());
+  if (bands_.air_nodes_change()) air_buffer_.upload(bands_.air_nodes());
   if (passes_.targets) passes_.targets->upload();
   if (passes_.gas) passes_.gas->upload();
   stage_->upload();
@@ -781,6 +790,7 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
                                                         ? GeometryPass::Shade::of_entities
                                                         : GeometryPass::Shade::none,
                                            .bands = static_cast<std::uint32_t>(bands->bands()),
+                                           .normal = bands->first_lobe() != 0,
                                            .seen = CachedStage::sees_in_band(scenario.thermal),
                                            .clutter = !clutter->empty()};
   auto geometry_pass = GeometryPass::create(*context, geometry_setup);
@@ -818,16 +828,14 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
   }
 
   // Create the renderer, then the thermal method, which reads its history.
-  auto renderer =
-      std::make_unique<GlRenderer>(scenario, std::move(*context), *geometry, output,
-                                   std::move(*bands), std::move(gas), std::move(*clutter),
-                                   std::move(passes));
-  auto stage =
-      cached ? CachedStage::create(scenario, std::move(*geometry), std::move(*foster),
-                                   renderer->history(), renderer->bands(), renderer->clutter(),
-                                   renderer->software())
-             : PerFrameStage::create(scenario, std::move(*geometry), std::move(*foster),
-                                     renderer->history());
+  auto renderer = std::make_unique<GlRenderer>(scenario, std::move(*context), *geometry, output,
+                                               std::move(*bands), std::move(gas),
+                                               std::move(*clutter), std::move(passes));
+  auto stage = cached ? CachedStage::create(scenario, std::move(*geometry), std::move(*foster),
+                                            renderer->history(), renderer->bands(),
+                                            renderer->clutter(), renderer->software())
+                      : PerFrameStage::create(scenario, std::move(*geometry), std::move(*foster),
+                                              renderer->history());
   if (!stage) return tl::unexpected(std::move(stage.error()));
   renderer->set_stage(std::move(*stage));
   if (glGetError() != GL_NO_ERROR || !renderer->memory_mapped()) {

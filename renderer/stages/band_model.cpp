@@ -59,8 +59,7 @@ float curvature_k(const physics::BandRadianceLut& lut) {
     return static_cast<double>(lut.lookup(static_cast<float>(kelvin)).radiance_w_m2_sr);
   };
   const double slope = (at(kAtK + kStepK) - at(kAtK - kStepK)) / (2.0 * kStepK);
-  const double bend =
-      (at(kAtK + kStepK) - 2.0 * at(kAtK) + at(kAtK - kStepK)) / (kStepK * kStepK);
+  const double bend = (at(kAtK + kStepK) - 2.0 * at(kAtK) + at(kAtK - kStepK)) / (kStepK * kStepK);
   return static_cast<float>(kAtK * kAtK * (bend / slope + 2.0 / kAtK));
 }
 
@@ -75,6 +74,8 @@ double sun_outside_w_m2(const physics::Band& band) {
 }  // namespace
 
 physics::Result<void> BandModel::build_views(const scene::ScenarioDesc& scenario) {
+  // The sky as lobes see it comes first.
+  if (lobes_) air_nodes_.resize(LobeModel::kSkyTable);
   // Bands of one atmosphere share its paths.
   for (std::size_t first = 0; first < entries_.size(); ++first) {
     if ((air_model_ >> first & 1U) == 0 || entries_[first].view) continue;
@@ -185,6 +186,7 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
   // The sky keeps to one dew point over the whole run: the humidity of a weather table does not
   // count.
   model.dew_point_k_ = scene::usual_dew_point_k(scenario);
+  model.lobes_ = LobeModel::build(scenario, materials);
   if (auto views = model.build_views(scenario); !views) return tl::unexpected(views.error());
   // Append the tables of the air behind those of the bands.
   for (std::size_t i = 0; i < model.entries_.size(); ++i) {
@@ -202,11 +204,14 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
                                     scenario.bands[i].name, model.tables_.size(), kMaxTableFloats));
     }
   }
-  // Append the emissivities of all materials.
+  // Append the emissivities of all materials, then the lobes of glossy ones.
   model.first_emissivity_ = static_cast<std::uint32_t>(model.tables_.size());
-  for (const scene::Material& material : materials) {
-    for (const scene::SpectralBand& band : scenario.bands) {
-      model.tables_.push_back(static_cast<float>(band_emissivity_frac(material, band.name)));
+  for (std::size_t m = 0; m < materials.size(); ++m) {
+    for (std::size_t b = 0; b < scenario.bands.size(); ++b) {
+      const auto glossy = model.lobes_ ? model.lobes_->hemispherical_emissivity_frac(m, b)
+                                       : std::optional<double>();
+      model.tables_.push_back(static_cast<float>(
+          glossy ? *glossy : band_emissivity_frac(materials[m], scenario.bands[b].name)));
     }
   }
   // Append what clutter changes of them, if there is any.
@@ -221,10 +226,15 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
           clutter ? static_cast<float>(scene::emissivity_sd_frac(*clutter, band.name)) : 0.0F);
     }
   }
+  if (model.lobes_) {
+    model.first_lobe_ = static_cast<std::uint32_t>(model.tables_.size());
+    const std::span<const float> lobes = model.lobes_->table();
+    model.tables_.insert(model.tables_.end(), lobes.begin(), lobes.end());
+  }
   if (model.tables_.size() > kMaxTableFloats) {
     return make_error(ErrorCode::config,
-                      fmt::format("{} materials in {} bands: their emissivities are more than a "
-                                  "device is sure to take",
+                      fmt::format("{} materials in {} bands: their emissivities and lobes are more "
+                                  "than a device is sure to take",
                                   materials.size(), scenario.bands.size()));
   }
   return model;
@@ -326,6 +336,7 @@ void BandModel::update(const physics::Forcing& forcing, const physics::SunPositi
         static_cast<float>((1.0 - cover_frac) * black(now.air_k + now.sky.warmer_k));
     params.cloud_radiance_w_m2_sr = static_cast<float>(cover_frac * cloud_w_m2_sr);
     params.clear_sky_frac = static_cast<float>(1.0 - cover_frac);
+    if (lobes_) update_lobe_sky(i, now);
     if (!entry.view) continue;
     entry.view->at(sensor_m,
                    {.warmer_k = warmer_k(entry, now),
@@ -335,6 +346,32 @@ void BandModel::update(const physics::Forcing& forcing, const physics::SunPositi
                     .cloud_radiance_w_m2_sr = cloud_w_m2_sr},
                    std::span(air_nodes_).subspan(params.air_view_first, physics::AirView::kNodes));
   }
+}
+
+void BandModel::update_lobe_sky(std::size_t band, const Instant& now) noexcept {
+  const Entry& entry = entries_[band];
+  const auto black = [&](double kelvin) {
+    return physics::band_radiance(entry.band, physics::Kelvin(kelvin)).radiance_w_m2_sr;
+  };
+  const double cover_frac = entry.has_sky ? now.sky.cloud_cover_frac : 0.0;
+  const double clouds_w_m2_sr = cover_frac > 0.0 ? cover_frac * black(now.sky.cloud_k) : 0.0;
+  const double air_w_m2_sr = black(now.air_k + now.sky.warmer_k);
+  const double warmer_k = entry.view ? sky_warmer_k(entry, now) : 0.0;
+  std::array<double, LobeModel::kSkySamples> sky_w_m2_sr{};
+  for (std::size_t s = 0; s < sky_w_m2_sr.size(); ++s) {
+    const double sine = LobeModel::sky_sample_sine(s);
+    double clear_w_m2_sr = 0.0;
+    if (entry.view) {
+      clear_w_m2_sr = entry.view->clear_sky_w_m2_sr(place_m_, warmer_k, sine);
+    } else if (entry.air) {
+      clear_w_m2_sr = entry.air->out(sine).path_radiance_w_m2_sr;
+    } else if (entry.has_sky) {
+      const double mass = physics::relative_air_mass(physics::Radians(std::asin(sine)));
+      clear_w_m2_sr = air_w_m2_sr * (1.0 - std::pow(entry.vertical_transmittance_frac, mass));
+    }
+    sky_w_m2_sr[s] = (1.0 - cover_frac) * clear_w_m2_sr + clouds_w_m2_sr;
+  }
+  lobes_->update_sky(band, sky_w_m2_sr, std::span(air_nodes_).first(LobeModel::kSkyTable));
 }
 
 std::span<const physics::AirView::Node> BandModel::air_nodes_of(std::size_t band) const noexcept {
@@ -426,8 +463,30 @@ RadianceTerms BandModel::terms(std::size_t band, const Seen& seen,
     sky[t] = params.sky_by_tilt_w_m2_sr[t / 4][static_cast<glm::length_t>(t % 4)];
   }
   const double from_sky = seen.open_frac * physics::sky_at_tilt(sky, seen.normal_up);
-  out.emission_w_m2_sr =
-      out.emissivity_frac * black_w_m2_sr(band, emitting_k) * out.air_frac;
+  if (lobes_) {
+    const auto glossy = lobes_->parts(
+        band,
+        {seen.material, seen.normal, seen.to_viewer, seen.to_sun, seen.open_frac, seen.sun_cosine,
+         seen.glint_per_sr},
+        {incoming_w_m2_sr, static_cast<float>(physics::sky_at_tilt(sky, seen.normal.z)),
+         params.surroundings_radiance_w_m2_sr},
+        std::span(air_nodes_).first(LobeModel::kSkyTable));
+    if (glossy) {
+      const double diffuse_sky = seen.open_frac * physics::sky_at_tilt(sky, seen.normal.z);
+      out.emissivity_frac = glossy->emissivity_frac;
+      out.emission_w_m2_sr = out.emissivity_frac * black_w_m2_sr(band, emitting_k) * out.air_frac;
+      out.sky_w_m2_sr = glossy->diffuse_frac * diffuse_sky * out.air_frac;
+      out.neighbours_w_m2_sr =
+          glossy->diffuse_frac * (incoming_w_m2_sr - diffuse_sky) * out.air_frac;
+      out.lobe_sky_w_m2_sr = glossy->lobe_sky_w_m2_sr * out.air_frac;
+      out.lobe_neighbours_w_m2_sr = glossy->lobe_neighbours_w_m2_sr * out.air_frac;
+      const double sun = params.sun_irradiance_w_m2 * out.air_sun_frac;
+      out.sun_w_m2_sr = glossy->diffuse_sun_per_sr * sun;
+      out.glint_w_m2_sr = glossy->glint_per_sr * sun;
+      return out;
+    }
+  }
+  out.emission_w_m2_sr = out.emissivity_frac * black_w_m2_sr(band, emitting_k) * out.air_frac;
   out.sky_w_m2_sr = reflected * from_sky;
   out.neighbours_w_m2_sr = reflected * (incoming_w_m2_sr - from_sky);
   out.sun_w_m2_sr = (1.0 - out.emissivity_frac) * params.sun_irradiance_w_m2 / physics::kPi *

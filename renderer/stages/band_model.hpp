@@ -16,6 +16,7 @@
 #include "emit/scene/scene_desc.hpp"
 #include "history/band_lights.hpp"
 #include "shared/frame_params.glsl.h"
+#include "stages/lobe_model.hpp"
 
 namespace emit::renderer {
 
@@ -72,7 +73,12 @@ class BandModel final : public BandLights {
     float range_m = 0.0F;
     float sin_elevation = 0.0F;    ///< of the line of sight
     float sensor_height_m = 0.0F;  ///< above sea level
-    float clutter_sd = 0.0F;       ///< mean of the clutter's field over the pixel
+    // Glossy surfaces only: unit vectors, relworld, and FrameView::glint_per_sr.
+    glm::vec3 normal{0.0F, 0.0F, 1.0F};
+    glm::vec3 to_viewer{0.0F, 0.0F, 1.0F};
+    glm::vec3 to_sun{0.0F, 0.0F, 1.0F};
+    float glint_per_sr = 0.0F;
+    float clutter_sd = 0.0F;           ///< mean of the clutter's field over the pixel
     float clutter_variance_k2 = 0.0F;  ///< of the temperature within the pixel
   };
   /// Splits the radiance of a pixel of the instant of update(). `incoming_w_m2_sr` is what arrives
@@ -91,8 +97,9 @@ class BandModel final : public BandLights {
   [[nodiscard]] std::uint32_t air_terms() const noexcept { return air_terms_; }
   /// Bits of the bands with built-in air.
   [[nodiscard]] std::uint32_t air_model() const noexcept { return air_model_; }
-  /// Tables of the built-in air for the camera of the frame, one behind the other
-  /// (lib/air_view.glsl). One node without built-in air.
+  /// The sky as lobes see it, if there are glossy materials (lib/lobe.glsl), then tables of the
+  /// built-in air for the camera of the frame, one behind the other (lib/air_view.glsl). One node
+  /// without either.
   [[nodiscard]] std::span<const physics::AirView::Node> air_nodes() const noexcept {
     return air_nodes_;
   }
@@ -102,6 +109,10 @@ class BandModel final : public BandLights {
   [[nodiscard]] std::uint32_t max_terms() const noexcept { return max_terms_; }
   /// Index of the first emissivity in tables(). Emissivities are ordered by material, then by band.
   [[nodiscard]] std::uint32_t first_emissivity() const noexcept { return first_emissivity_; }
+  /// Index of the first number of the lobes in tables(); 0 without glossy materials.
+  [[nodiscard]] std::uint32_t first_lobe() const noexcept { return first_lobe_; }
+  /// True if air_nodes() differ from frame to frame.
+  [[nodiscard]] bool air_nodes_change() const noexcept { return air_model_ != 0 || lobes_; }
   /// Index of the first change of an emissivity per standard deviation of the clutter, in the same
   /// order.
   [[nodiscard]] std::uint32_t first_emissivity_sd() const noexcept { return first_emissivity_sd_; }
@@ -145,6 +156,8 @@ class BandModel final : public BandLights {
   [[nodiscard]] double warmer_k(const Entry& entry, const Instant& now) const noexcept;
   [[nodiscard]] double sky_warmer_k(const Entry& entry, const Instant& now) const noexcept;
   void light_of(const Entry& entry, const Instant& now, BandLight& out) const noexcept;
+  /// Sets the sky of a band as lobes see it.
+  void update_lobe_sky(std::size_t band, const Instant& now) noexcept;
   std::vector<Entry> entries_;
   std::vector<gpu::BandParams> params_;
   std::vector<float> tables_;
@@ -160,6 +173,8 @@ class BandModel final : public BandLights {
   std::uint32_t max_terms_ = 0;
   std::uint32_t first_emissivity_sd_ = 0;
   std::uint32_t first_emissivity_ = 0;
+  std::uint32_t first_lobe_ = 0;
+  std::optional<LobeModel> lobes_;  ///< empty without glossy materials
 };
 
 /// Returns the transmittance of built-in air on a line of sight for what a source of a temperature

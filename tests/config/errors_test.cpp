@@ -313,6 +313,22 @@ const std::vector<Case>& cases() {
        material("base_k = 290\nlayers = [{ thickness_m = 0, conductivity_w_m_k = 1, "
                 "density_kg_m3 = 2000, specific_heat_j_kg_k = 900 }]\n"),
        "s.toml:7:27: 'thickness_m' is 0, must be > 0, <= 100"},
+      {"gloss_without_reflectance", material("prescribed_k = 400\ngloss = { facet_slope = 0.1 }\n"),
+       "s.toml:7:9: 'gloss' needs one of: 'index'; 'wavelength_um', 'refractive_index' and "
+       "'extinction_index'; 'angle_deg' and 'angle_emissivity_frac'"},
+      {"gloss_of_uneven_lists",
+       material("prescribed_k = 400\ngloss = { wavelength_um = [4, 10], refractive_index = [1.5], "
+                "extinction_index = [0, 0] }\n"),
+       "s.toml:7:9: 'wavelength_um', 'refractive_index' and 'extinction_index' differ in length"},
+      {"gloss_slope_at_sea",
+       material(
+           "prescribed_k = 400\ngloss = { index = \"water\", sea = true, facet_slope = 0.1 }\n"),
+       "s.toml:7:54: 'facet_slope' has no effect: with 'sea' the wind gives the slopes"},
+      {"gloss_below_the_emissivity",
+       material("prescribed_k = 400\ngloss = { wavelength_um = [10], refractive_index = [3], "
+                "extinction_index = [0] }\n"),
+       "s.toml:7:9: material 'x': 'emissivity_frac' of 0.900, which the heat balance uses, is more "
+       "than the interface of 'gloss' lets through over the hemisphere, 0.724"},
       {"wetness_above_1", material("base_k = 290\nwetness_frac = 1.5\n" + kLayer),
        "s.toml:7:16: 'wetness_frac' is 1.5, must be 0 .. 1"},
       {"resistance_below_0", material("base_k = 290\nsurface_resistance_s_m = -1\n" + kLayer),

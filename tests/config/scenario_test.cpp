@@ -210,6 +210,7 @@ wetness_frac = 0.625
 surface_resistance_s_m = 90.5
 night_resistance_s_m = 300.25
 dry_layers_valid = false
+gloss = { wavelength_um = [4.0, 10.0], refractive_index = [1.25, 1.125], extinction_index = [0.0, 0.0625], lobe_frac = 0.75, facet_slope = 0.125 }
 layers = [
   { thickness_m = 0.05, conductivity_w_m_k = 0.7, density_kg_m3 = 2120.0, specific_heat_j_kg_k = 920.0 },
   { thickness_m = 0.5, conductivity_w_m_k = 2.0, density_kg_m3 = 1900.0, specific_heat_j_kg_k = 850.0 },
@@ -374,6 +375,11 @@ TEST_F(ConfigTest, every_scenario_key_reaches_its_field) {
   EXPECT_EQ(s.materials[2].night_resistance_s_m, 300.25);
   EXPECT_EQ(scene::moisture_of(s.materials[2]).night_resistance_s_m, 300.25);
   EXPECT_TRUE(scene::moisture_of(s.materials[1]).dry());
+  ASSERT_TRUE(s.materials[2].gloss.has_value());
+  EXPECT_EQ(s.materials[2].gloss->refractive_index, (std::vector<double>{1.25, 1.125}));
+  EXPECT_EQ(s.materials[2].gloss->extinction_index, (std::vector<double>{0.0, 0.0625}));
+  EXPECT_EQ(s.materials[2].gloss->lobe_frac, 0.75);
+  EXPECT_EQ(s.materials[2].gloss->facet_slope, 0.125);
   EXPECT_FALSE(s.materials[2].dry_layers_valid);
   EXPECT_TRUE(s.materials[1].dry_layers_valid);
 }

@@ -116,7 +116,7 @@ TEST_F(ConfigTest, the_shipped_library_is_complete_and_consistent) {
   for (const scene::Material& material : loaded->materials) {
     const bool stirred = material.family == "water, snow and ice";
     const bool moist = material.family == "vegetation" || material.name == "water" ||
-                       material.name.ends_with("_wet");
+                       material.name == "sea" || material.name.ends_with("_wet");
     EXPECT_EQ(moist, !scene::moisture_of(material).dry()) << material.name;
     EXPECT_TRUE(!stirred || !material.dry_layers_valid) << material.name;
     if (moist) {
@@ -168,7 +168,7 @@ TEST_P(ShippedScenario, loads_prints_and_loads_again) {
 
 INSTANTIATE_TEST_SUITE_P(Each, ShippedScenario,
                          ::testing::Values("box", "statue", "block-on-road", "ribbed", "airfield",
-                                           "engage", "decoys"),
+                                           "engage", "decoys", "sea"),
                          [](const auto& each) {
                            std::string name = each.param;
                            std::replace(name.begin(), name.end(), '-', '_');

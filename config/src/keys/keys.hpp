@@ -123,6 +123,9 @@ struct DaemonHead {
 [[nodiscard]] const KeyTable<scene::FosterMode>& foster_mode_keys();
 [[nodiscard]] const KeyTable<scene::FosterFit>& foster_fit_keys();
 [[nodiscard]] const KeyTable<scene::MaterialSpread>& spread_keys();
+[[nodiscard]] const KeyTable<scene::Gloss>& gloss_keys();
+/// Returns the key `gloss` of a material.
+[[nodiscard]] Key<scene::Material> gloss_key();
 
 [[nodiscard]] const KeyTable<DaemonHead>& daemon_head_keys();
 [[nodiscard]] const KeyTable<SourceConfig>& source_keys();

@@ -278,6 +278,7 @@ const KeyTable<Material>& material_keys() {
                        EMIT_FIELD(night_resistance_s_m),
                        "foster: the same without sunlight, when stomata are closed. Without it "
                        "that in sunlight counts."),
+      gloss_key(),
       boolean<Material>("dry_layers_valid", EMIT_FIELD(dry_layers_valid),
                         "`false` says that heat also moves by melting, stirring or other "
                         "evaporation. Temperatures are then a guide only, and a warning says so."),

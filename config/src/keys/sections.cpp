@@ -101,6 +101,11 @@ const std::vector<SectionDoc>& scenario_sections() {
                   "Uncertainty of a material: half-widths of the ranges in which published values "
                   "lie. 0 says nothing.",
                   spread_keys(), scene::MaterialSpread{}),
+      section_doc("material.gloss", false,
+                  "Gloss of a material: emission by angle and a lobe around the mirror direction "
+                  "([physics.md](../renderer/docs/physics.md), section 5). One source of its "
+                  "reflectance is required: `index`, constants of your own, or a table by angle.",
+                  gloss_keys(), scene::Gloss{}),
       section_doc("display", false, "Limits of the false-colour display.", display_keys(),
                   scene::DisplayOptions{}),
   };

@@ -36,6 +36,8 @@ void check_channels(const Node& root, const scene::ScenarioDesc& scenario, bool 
 [[nodiscard]] std::vector<scene::SpectralBand> bands_in_use(
     const std::vector<scene::ChannelDesc>& channels,
     const std::vector<scene::SpectralBand>& declared);
+/// Bands that need no declaration.
+[[nodiscard]] const std::vector<scene::SpectralBand>& built_in_bands();
 /// Gives materials an emissivity in bands that they do not list: that of the listed built-in band
 /// that is most like it, by overlap over union. A band that overlaps none keeps the material's
 /// total emissivity.

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "emit/config/slab_modes.hpp"
+#include "emit/scene/gloss_optics.hpp"
 #include "resolve.hpp"
 
 namespace emit::config {
@@ -79,6 +80,26 @@ void check_moisture(const Material& material, const Node& node, Diagnostics& dia
   }
 }
 
+/// Reports a gloss without one source of its reflectance, and keys that have no effect.
+void check_gloss(const Material& material, const Node& node, Diagnostics& diagnostics) {
+  if (!material.gloss) return;
+  const Node& gloss = *node.find("gloss");
+  if (auto valid = scene::validate(*material.gloss); !valid) {
+    diagnostics.add(gloss.at, valid.error().text);
+    return;
+  }
+  if (material.gloss->sea && gloss.has("facet_slope")) {
+    diagnostics.add(key_location(gloss, "facet_slope"),
+                    "'facet_slope' has no effect: with 'sea' the wind gives the slopes");
+  }
+  if (!material.gloss->sea && gloss.has("sea_wind_m_s")) {
+    diagnostics.add(key_location(gloss, "sea_wind_m_s"), "'sea_wind_m_s' needs 'sea'");
+  }
+  if (auto fits = scene::check_emissivities(material, built_in_bands()); !fits) {
+    diagnostics.add(gloss.at, fits.error().text);
+  }
+}
+
 void check_material(const Material& material, const Node& node,
                     const std::vector<std::string>& known_bands, Diagnostics& diagnostics) {
   if (node.has("name") && material.name.empty()) {
@@ -120,6 +141,7 @@ void check_material(const Material& material, const Node& node,
     }
   }
   check_moisture(material, node, diagnostics);
+  check_gloss(material, node, diagnostics);
   check_bands(node, known_bands, diagnostics);
   if (const Node* spread = node.find("spread")) check_bands(*spread, known_bands, diagnostics);
 }

@@ -12,8 +12,6 @@ using scene::BandAtmosphere;
 using scene::ChannelDesc;
 using scene::SpectralBand;
 
-namespace {
-
 const std::vector<SpectralBand>& built_in_bands() {
   static const std::vector<SpectralBand> bands = {{"3-5", 3.0, 5.0, {}},
                                                   {"3.4-4.1", 3.4, 4.1, {}},
@@ -21,6 +19,8 @@ const std::vector<SpectralBand>& built_in_bands() {
                                                   {"7.7-9.3", 7.7, 9.3, {}}};
   return bands;
 }
+
+namespace {
 
 std::string listed(const std::vector<std::string>& names) {
   std::string out;

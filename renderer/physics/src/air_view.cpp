@@ -214,6 +214,14 @@ SkyByTilt AirView::clear_sky_by_tilt_w_m2_sr(double height_m, double warmer_k) c
   return sum;
 }
 
+double AirView::clear_sky_w_m2_sr(double height_m, double warmer_k,
+                                  double sin_elevation) const noexcept {
+  const Place place = place_of(height_m, warmer_k);
+  const ViewCell cell = elevation_cell(static_cast<float>(sin_elevation));
+  const std::size_t i = kHeights * kRanges + cell.index;
+  return std::lerp(radiance_at(place, i), radiance_at(place, i + 1), cell.fraction);
+}
+
 double AirView::sun_transmittance_frac(double height_m, double sin_elevation) const noexcept {
   const Place place = place_of(height_m, 0.0);
   const ViewCell cell = elevation_cell(static_cast<float>(sin_elevation));

@@ -204,6 +204,13 @@ Result<void> SceneSolver::Data::choose_dimension(bool& three) {
 /// past moving or shaped objects.
 void SceneSolver::Data::note_interiors_and_parts() {
   for (const scene::Material& material : geometry.materials) {
+    if (!material.gloss) continue;
+    notes.push_back(fmt::format(
+        "material '{}' is glossy, but its radiance here is emitted and reflected evenly to all "
+        "sides, with the emissivities that it states",
+        material.name));
+  }
+  for (const scene::Material& material : geometry.materials) {
     if (!material.rests_on_body()) continue;
     notes.push_back(
         fmt::format("material '{}' rests on the interior of its body, which is held at {:.1f} K "

@@ -14,6 +14,10 @@ layout(location = 1) out EMIT_BANDS_VEC incoming;
 #ifdef EMIT_OBJECTS
 layout(location = 2) out uint object;
 #endif
+#ifdef EMIT_NORMAL
+in vec3 normal_relworld;
+layout(location = EMIT_NORMAL) out vec2 normal_octahedral;
+#endif
 #ifdef EMIT_CLUTTER
 in vec3 tile_position;
 in vec2 clutter_k;
@@ -52,6 +56,10 @@ void main() {
   incoming = incoming_w_m2_sr;
 #ifdef EMIT_OBJECTS
   object = draw.object;
+#endif
+#ifdef EMIT_NORMAL
+  vec3 n = normalize(normal_relworld);
+  normal_octahedral = octahedral_from_unit(gl_FrontFacing ? n : -n);
 #endif
 #ifdef EMIT_CLUTTER
   clutter = draw.field != 0u ? packed_clutter() : uvec4(0u);

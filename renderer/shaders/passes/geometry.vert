@@ -46,6 +46,9 @@ layout(location = EMIT_ATTR_HULL) in vec4 hull;
 #endif
 // Temperature in K, share of the sun, share of the sky, cosine of the sun's incidence on the front.
 out vec4 sample_state;
+#ifdef EMIT_NORMAL
+out vec3 normal_relworld;
+#endif
 #else
 out vec3 normal_relworld;
 #endif
@@ -78,6 +81,9 @@ void main() {
   float sky_frac = normal_mesh.w;
 #endif
   sample_state = vec4(frame.reference_k + now.x, now.y, sky_frac, cosine);
+#ifdef EMIT_NORMAL
+  normal_relworld = n * per_length;
+#endif
   // Add up what arrives: the open part of the hemisphere shows sky, the rest surroundings and other samples.
 #ifdef EMIT_SEEN
   vec4 incoming = mix(seen_before, seen_after, frame.node_frac);

@@ -8,6 +8,7 @@
 //   EMIT_AIR_MODEL  bit per band: the air is built in
 //   EMIT_OUTPUTS    planes besides radiance, EMIT_OUTPUT_*
 //   EMIT_CLUTTER    defined: some materials vary from place to place; EMIT_CLUTTER_EMISSIVITY: their emissivity too
+//   EMIT_LOBES      index of the first number of the lobes, if there are glossy materials
 //   EMIT_ROWS       number of blocks of 8 x 8 pixels, one below the other, that a work group computes
 #include "passes/gbuffer.glsl"
 #include "passes/tables.glsl"
@@ -28,6 +29,11 @@ layout(std430, binding = EMIT_BIND_STATS) buffer Stats { FrameStatsGpu stats; };
 layout(binding = EMIT_TEX_AIR) uniform samplerBuffer air_nodes;
 #define EMIT_AIR_VIEW(index) texelFetch(air_nodes, index)
 #include "lib/air_view.glsl"
+#ifdef EMIT_LOBES
+#define EMIT_LOBE_TABLE(index) texelFetch(band_lut, EMIT_LOBES + (index)).r
+#define EMIT_LOBE_SKY(index) texelFetch(air_nodes, index)
+#include "lib/lobe.glsl"
+#endif
 
 // Surface that a pixel shows. For a pixel of the sky only `boresight_m` is used.
 struct Seen {
@@ -102,6 +108,8 @@ Seen seen_at(ivec2 px) {
   return Seen(gbuffer_depth_m(px), temperature_at(px, int(ids.x)), open_frac,
               sun_frac * max(dot(n, frame.to_sun), 0.0), ids.x, ids.y, n.z);
 }
+#endif
+#if !defined(EMIT_CACHED) || defined(EMIT_LOBES)
 #define EMIT_SKY_TILT(band, node) band_uniforms[band].sky_by_tilt_w_m2_sr[(node) >> 2][(node) & 3]
 #include "lib/sky_tilt.glsl"
 #endif
@@ -170,6 +178,32 @@ vec2 leaving_w_m2_sr(uint band, Seen seen, float incoming, inout bool clamped) {
   return vec2(emitted + (1.0 - emissivity_frac) * incoming, (1.0 - emissivity_frac) * sunlight);
 }
 
+#ifdef EMIT_LOBES
+// Finds what all bands share of the lobe of a pixel. The block is 0 where the surface is not glossy.
+LobePixel lobe_of(ivec2 px, Seen seen, bool surface) {
+  int block = surface ? int(EMIT_LOBE_TABLE(int(seen.material))) : 0;
+  LobePixel none;
+  none.block = 0;
+  if (block == 0) return none;
+  return lobe_pixel(block, gbuffer_normal(px), -normalize(view_ray(px)), frame.to_sun, seen.open_frac,
+                    seen.sun_cosine);
+}
+
+// The same as leaving_w_m2_sr() for a glossy surface. `tilt` is the place of its face on the sky by tilt.
+vec2 glossy_leaving_w_m2_sr(uint band, Seen seen, LobePixel lobe, vec2 tilt, float incoming, inout bool clamped) {
+  vec4 lut = vec4(bands[band].lut_first_k, bands[band].lut_nodes_per_k, bands[band].lut_last_node,
+                  float(band * frame.band_lut_nodes));
+  float emitting_k = seen.temperature_k;
+#ifdef EMIT_CLUTTER
+  float per_k = 1.0 / max(emitting_k, 1.0);
+  emitting_k += 0.5 * seen.clutter_variance_k2 * (bands[band].curvature_k * per_k - 2.0) * per_k;
+#endif
+  float black = planck_lut_radiance_w_m2_sr(emitting_k, lut, clamped);
+  return lobe_leaving_w_m2_sr(band, lobe, black, incoming, sky_at_tilt_w_m2_sr(band, tilt),
+                              bands[band].surroundings_radiance_w_m2_sr, bands[band].sun_irradiance_w_m2);
+}
+#endif
+
 // Logarithm of the air's extinction for a surface at a temperature. Between 300 K, 800 K and the sun it is linear in 1 /
 // T (physics.md section 11).
 float log_extinction_at(vec4 sight, float temperature_k) {
@@ -208,12 +242,19 @@ void write_pixel(ivec2 px) {
   if (surface) air_place = sight_place;
   bool clamped = false;
   bool nonfinite = false;
+#ifdef EMIT_LOBES
+  LobePixel lobe = lobe_of(px, seen, surface);
+  vec2 tilt = sky_tilt_place(lobe.block != 0 ? lobe.normal.z : 1.0);
+#endif
 
   // Compute the radiance of each band. Where both sides are cheap the code selects and does not branch, because
   // software rasterisers run both sides of a branch anyway.
   for (uint i = 0u; i < EMIT_BANDS; ++i) {
     bool off_table = false;
     vec2 leaving = leaving_w_m2_sr(i, seen, incoming[i], off_table);
+#ifdef EMIT_LOBES
+    if (lobe.block != 0) leaving = glossy_leaving_w_m2_sr(i, seen, lobe, tilt, incoming[i], off_table);
+#endif
     clamped = clamped || (surface && off_table);
     float radiance_w_m2_sr = surface ? leaving.x + leaving.y : 0.0;
     if ((EMIT_AIR_MODEL >> i & 1u) != 0u) {
@@ -265,6 +306,11 @@ void write_pixel(ivec2 px) {
 #else
     for (int i = 0; i < 3; ++i) planes[plane++ * plane_px + pixel] = 0.0;
 #endif
+    vec4 glossy = vec4(0.0);
+#ifdef EMIT_LOBES
+    if (lobe.block != 0) glossy = vec4(lobe.normal, lobe.glint_per_sr);
+#endif
+    for (int i = 0; i < 4; ++i) planes[plane++ * plane_px + pixel] = glossy[i];
   }
   // Count the pixel if it is flagged.
   int flags = (nonfinite ? EMIT_FLAG_NONFINITE : 0) + (clamped ? EMIT_FLAG_CLAMPED : 0);

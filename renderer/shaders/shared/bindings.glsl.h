@@ -117,7 +117,8 @@
 #define EMIT_OUTPUT_OBJECT 4u
 #define EMIT_OUTPUT_SUN 8u
 #define EMIT_OUTPUT_SKY 16u
-// Radiance that arrives at the surface, a plane for each band, then the material and three of its clutter.
+// Radiance that arrives at the surface, a plane for each band, then the material, three of its clutter, and the normal
+// and the glint of a glossy surface.
 #define EMIT_OUTPUT_TERMS 32u
 
 // Indices of FrameStatsGpu.flagged_px.

@@ -69,11 +69,19 @@ bool has_gas(const renderer::RadianceTerms& terms) {
   return terms.gas_frac != 1.0 || terms.gas_w_m2_sr != 0.0;
 }
 
+/// True if a pixel shows a glossy surface.
+bool has_lobe(const renderer::RadianceTerms& terms) {
+  return terms.lobe_sky_w_m2_sr != 0.0 || terms.lobe_neighbours_w_m2_sr != 0.0 ||
+         terms.glint_w_m2_sr != 0.0;
+}
+
 std::vector<std::vector<std::string>> term_rows(const ExplainedBand& band) {
   std::vector<std::vector<std::string>> out;
   const double sum = band.terms.sum_w_m2_sr();
   for (const auto& [name, value] : named_terms(band.terms)) {
     if (name == "gas" && !has_gas(band.terms)) continue;
+    const bool of_lobe = name.ends_with("in the lobe") || name == "glint";
+    if (of_lobe && !has_lobe(band.terms)) continue;
     out.push_back({std::string(name), fmt::format("{:.6g}", value),
                    fmt::format("{:.2f} %", sum != 0.0 ? 100.0 * value / sum : 0.0)});
   }
@@ -118,12 +126,15 @@ std::string headline(const Explanation& found) {
 
 }  // namespace
 
-std::array<std::pair<std::string_view, double>, 6> named_terms(
+std::array<std::pair<std::string_view, double>, 9> named_terms(
     const renderer::RadianceTerms& terms) {
   return {{{"emission", terms.emission_w_m2_sr},
            {"reflected sky", terms.sky_w_m2_sr},
            {"reflected neighbours", terms.neighbours_w_m2_sr},
            {"reflected sun", terms.sun_w_m2_sr},
+           {"sky in the lobe", terms.lobe_sky_w_m2_sr},
+           {"neighbours in the lobe", terms.lobe_neighbours_w_m2_sr},
+           {"glint", terms.glint_w_m2_sr},
            {"path", terms.path_w_m2_sr},
            {"gas", terms.gas_w_m2_sr}}};
 }
@@ -169,6 +180,9 @@ Json explain_json(const Explanation& found) {
     Json terms = Json::object();
     terms.set("emission_w_m2_sr", t.emission_w_m2_sr).set("sky_w_m2_sr", t.sky_w_m2_sr);
     terms.set("neighbours_w_m2_sr", t.neighbours_w_m2_sr).set("sun_w_m2_sr", t.sun_w_m2_sr);
+    terms.set("lobe_sky_w_m2_sr", t.lobe_sky_w_m2_sr);
+    terms.set("lobe_neighbours_w_m2_sr", t.lobe_neighbours_w_m2_sr);
+    terms.set("glint_w_m2_sr", t.glint_w_m2_sr);
     terms.set("path_w_m2_sr", t.path_w_m2_sr).set("gas_w_m2_sr", t.gas_w_m2_sr);
     Json json = Json::object();
     json.set("band", band.name).set("pixel_w_m2_sr", band.pixel_w_m2_sr);

@@ -58,6 +58,8 @@ std::map<std::string, Setter, std::less<>> setters(scenegen::GenerateOptions& op
               {"length_m", number(options.ribbed.length_m)}};
     case SceneKind::airfield:
       return {{"seed", number(options.airfield.seed)}};
+    case SceneKind::sea:
+      break;
   }
   return {};
 }
@@ -71,8 +73,8 @@ std::vector<std::string> keys_of(const std::map<std::string, Setter, std::less<>
 }  // namespace
 
 std::vector<SceneKind> all_scene_kinds() {
-  return {SceneKind::box, SceneKind::statue, SceneKind::block_on_road, SceneKind::ribbed,
-          SceneKind::airfield};
+  return {SceneKind::box,    SceneKind::statue,   SceneKind::block_on_road,
+          SceneKind::ribbed, SceneKind::airfield, SceneKind::sea};
 }
 
 std::vector<std::string> scene_names() {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/ext/vector_double3.hpp>
 #include <vector>
 
 #include "emit/physics/constants.hpp"

@@ -235,7 +235,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(CliUsage, generate_lists_the_scenes_that_it_knows) {
   const std::string help = run_emit({"generate", "--help"}).out;
-  for (const char* scene : {"box", "statue", "block-on-road", "ribbed", "airfield", "all"}) {
+  for (const char* scene : {"box", "statue", "block-on-road", "ribbed", "airfield", "sea", "all"}) {
     EXPECT_NE(help.find(scene), std::string::npos) << help;
   }
 }

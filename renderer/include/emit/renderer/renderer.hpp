@@ -149,13 +149,17 @@ struct FrameView {
   std::span<const float> sun_cosine;                     ///< empty unless asked for
   std::span<const float> sky_frac;                       ///< empty unless asked for
   /// Radiance that arrives at the surface from everything but the sun, one plane per band, the
-  /// material, and its clutter: mean of the field over the pixel, what it adds to the temperature,
-  /// and the variance of the temperature within the pixel. Empty unless OutputOptions::terms.
+  /// material, its clutter (mean of the field over the pixel, what it adds to the temperature, and
+  /// the variance of the temperature within the pixel), and of glossy surfaces the normal (east,
+  /// north, up) and the sun's light that facets without loss would reflect, per irradiance (0
+  /// elsewhere). Empty unless OutputOptions::terms.
   std::vector<std::span<const float>> incoming_w_m2_sr;
   std::span<const float> material;
   std::span<const float> clutter_sd;
   std::span<const float> clutter_k;
   std::span<const float> clutter_variance_k2;
+  std::array<std::span<const float>, 3> normal;
+  std::span<const float> glint_per_sr;
   std::span<const float> coverage_frac;  ///< empty unless asked for
   FrameStats stats;
   std::uint8_t quality_level = 0;  ///< quality level that was rendered
@@ -180,16 +184,20 @@ struct RadianceTerms {
   double sky_w_m2_sr = 0.0;         ///< reflected
   double neighbours_w_m2_sr = 0.0;  ///< reflected: bodies, ground and surroundings that it sees
   double sun_w_m2_sr = 0.0;         ///< reflected
-  double path_w_m2_sr = 0.0;        ///< of the air in between; the sky itself where it is seen
-  double gas_w_m2_sr = 0.0;         ///< of hot gas, smoke and flares in between
-  double gas_frac = 1.0;            ///< transmittance of these, which the terms above include
+  // Reflected by the lobe of a glossy surface: sky, what hides it or lies below it, and the sun.
+  double lobe_sky_w_m2_sr = 0.0;
+  double lobe_neighbours_w_m2_sr = 0.0;
+  double glint_w_m2_sr = 0.0;
+  double path_w_m2_sr = 0.0;  ///< of the air in between; the sky itself where it is seen
+  double gas_w_m2_sr = 0.0;   ///< of hot gas, smoke and flares in between
+  double gas_frac = 1.0;      ///< transmittance of these, which the terms above include
   double emissivity_frac = 0.0;
   double air_frac = 1.0;      ///< transmittance for emission and for what is reflected
   double air_sun_frac = 1.0;  ///< transmittance for reflected sunlight
 
   [[nodiscard]] double sum_w_m2_sr() const noexcept {
-    return emission_w_m2_sr + sky_w_m2_sr + neighbours_w_m2_sr + sun_w_m2_sr + path_w_m2_sr +
-           gas_w_m2_sr;
+    return emission_w_m2_sr + sky_w_m2_sr + neighbours_w_m2_sr + sun_w_m2_sr + lobe_sky_w_m2_sr +
+           lobe_neighbours_w_m2_sr + glint_w_m2_sr + path_w_m2_sr + gas_w_m2_sr;
   }
 };
 

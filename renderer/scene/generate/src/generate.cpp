@@ -11,6 +11,7 @@
 
 #include "airfield.hpp"
 #include "glb_writer.hpp"
+#include "sea.hpp"
 #include "simple_scenes.hpp"
 #include "statue.hpp"
 
@@ -21,12 +22,13 @@ using physics::ErrorCode;
 using physics::make_error;
 using physics::Result;
 
-constexpr std::array<std::pair<SceneKind, std::string_view>, 5> kKindNames{
+constexpr std::array<std::pair<SceneKind, std::string_view>, 6> kKindNames{
     {{SceneKind::box, "box"},
      {SceneKind::statue, "statue"},
      {SceneKind::block_on_road, "block-on-road"},
      {SceneKind::ribbed, "ribbed"},
-     {SceneKind::airfield, "airfield"}}};
+     {SceneKind::airfield, "airfield"},
+     {SceneKind::sea, "sea"}}};
 
 /// Returns an error that names the option when `valid` is false. `value` may be NaN.
 Result<void> require(bool valid, const char* option, double value, const char* rule) {
@@ -110,6 +112,7 @@ Result<void> check(const GenerateOptions& options) {
     case SceneKind::ribbed:
       return check(options.ribbed);
     case SceneKind::airfield:
+    case SceneKind::sea:
       break;
   }
   return {};
@@ -137,6 +140,9 @@ Result<NamedScenes> build(const GenerateOptions& options) {
       break;
     case SceneKind::ribbed:
       scenes.emplace_back(name, ribbed_scene(options.ribbed));
+      break;
+    case SceneKind::sea:
+      scenes = sea_scenes();
       break;
     case SceneKind::airfield: {
       scenes = vehicle_scenes();

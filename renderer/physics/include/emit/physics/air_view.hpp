@@ -68,6 +68,9 @@ class AirView {
   /// the first call.
   [[nodiscard]] SkyByTilt clear_sky_by_tilt_w_m2_sr(double height_m,
                                                     double warmer_k) const noexcept;
+  /// Returns the clear sky's radiance in a direction from a height, W m-2 sr-1. RT-safe.
+  [[nodiscard]] double clear_sky_w_m2_sr(double height_m, double warmer_k,
+                                         double sin_elevation) const noexcept;
   /// Returns the transmittance to space for the third source at a height, by the sine of the
   /// apparent elevation. RT-safe.
   [[nodiscard]] double sun_transmittance_frac(double height_m, double sin_elevation) const noexcept;

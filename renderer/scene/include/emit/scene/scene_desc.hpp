@@ -17,6 +17,7 @@
 #include "emit/scene/channel_output.hpp"
 #include "emit/scene/clutter_desc.hpp"
 #include "emit/scene/gas_desc.hpp"
+#include "emit/scene/gloss.hpp"
 
 /// Plain description of a scenario. `config` fills it from files, `renderer` and `reference` read
 /// it; it holds no loaded geometry and no GPU or parser types. All values SI, angles in radians.
@@ -146,6 +147,7 @@ struct Material {
   std::optional<double> wetness_frac;            ///< 0..1; absent: 1
   std::optional<double> surface_resistance_s_m;  ///< in sunlight; absent: 0
   std::optional<double> night_resistance_s_m;    ///< absent: the same as in sunlight
+  std::optional<Gloss> gloss;  ///< absent: the surface emits and reflects evenly to all sides
   /// Temperature of a hot part or another emitter that takes no part in the thermal simulation.
   std::optional<double> prescribed_k;
   /// True for both faces of a thin body, whose layers are half of it over an insulated middle (see

@@ -11,13 +11,14 @@
 
 /// Generator of the scenes of the demo, the tests and the benchmarks, as .glb files. The same
 /// options give the same bytes. Files are named after the scene. `airfield` writes several
-/// (airfield.glb and one per vehicle), which config/scenarios/airfield.toml places.
+/// (airfield.glb and one per vehicle), which config/scenarios/airfield.toml places, and so does
+/// `sea` (sea.glb and ship.glb).
 namespace emit::scenegen {
 
 /// Kind of a scene.
-enum class SceneKind : std::uint8_t { box, statue, block_on_road, ribbed, airfield };
+enum class SceneKind : std::uint8_t { box, statue, block_on_road, ribbed, airfield, sea };
 
-/// Returns the command-line name of a kind: box, statue, block-on-road, ribbed, airfield.
+/// Returns the command-line name of a kind: box, statue, block-on-road, ribbed, airfield, sea.
 [[nodiscard]] std::string_view to_string(SceneKind kind) noexcept;
 /// Returns the kind with a command-line name, or nothing.
 [[nodiscard]] std::optional<SceneKind> scene_kind_from(std::string_view name) noexcept;
