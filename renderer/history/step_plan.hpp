@@ -21,6 +21,7 @@ struct HistoryInterval {
   physics::SunPosition sun_end;
   physics::Forcing forcing_begin;
   physics::Forcing forcing_end;
+  double rain_mm = 0.0;  ///< depth that falls in it
   bool sun_up = false;  ///< true when the sun needs a shadow map
 };
 

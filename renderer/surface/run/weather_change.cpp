@@ -52,7 +52,12 @@ bool weather_matters(const SurfaceNode& node, std::int64_t now_ns, const Environ
     change_w_m2 += std::abs(physics::environment_input_w_m2(1.0, weather.environment_k) -
                             between(taken.begin.environment_w_m2, taken.end.environment_w_m2, way));
   }
-  return change_w_m2 > kMinChangeWM2K * tolerance_k;
+  // Water matters by the heat that takes it away: 0.01 mm are 24 kJ/m2.
+  constexpr double kRainMm = 0.01;
+  const std::int64_t begin_ns = node.at_ns - std::llround(1e9 * taken.dt_s);
+  const double rain_change_mm =
+      std::abs(environment.rain_mm(begin_ns, node.at_ns) - taken.rain_mm);
+  return change_w_m2 > kMinChangeWM2K * tolerance_k || rain_change_mm > kRainMm;
 }
 
 }  // namespace emit::renderer

@@ -27,6 +27,7 @@ void add_weather(Fnv64& hash, const physics::WeatherSample& row) {
   add_optional(hash, row.film_w_m2_k);
   add_optional(hash, row.wind_from_rad);
   add_optional(hash, row.relative_humidity_frac);
+  add(hash, row.rain_mm_h);
 }
 
 void add_pose(Fnv64& hash, const physics::Pose& pose) {
@@ -91,6 +92,8 @@ void add_material(Fnv64& hash, const scene::Material& material) {
   add_optional(hash, material.prescribed_k);
   const physics::MoistSurface moisture = scene::moisture_of(material);
   add(hash, moisture.wetness_frac, moisture.resistance_s_m, moisture.night_resistance_s_m);
+  const physics::WaterStore store = scene::water_store_of(material);
+  add(hash, store.kind, store.capacity_mm, store.ready_mm, store.initial_mm);
 }
 
 std::uint64_t materials_hash(const scene::ScenarioDesc& scenario,
