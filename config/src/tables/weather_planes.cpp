@@ -37,7 +37,7 @@ RowsOfFile rows_of_year(const WeatherYear& year, const std::string& name) {
   while (first.is_leap()) ++first;
   const auto days = sys_days(first / January / 1).time_since_epoch();
   scenario.epoch_utc_ns =
-      duration_cast<nanoseconds>(days).count() - std::llround(year.zone_h * 3.6e12);
+      duration_cast<std::chrono::nanoseconds>(days).count() - std::llround(year.zone_h * 3.6e12);
   std::vector<std::string> warnings;
   RowsOfFile out;
   out.rows = weather_of_year(year, name, scenario, warnings);

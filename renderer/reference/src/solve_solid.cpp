@@ -289,7 +289,7 @@ Result<void> SolidHistory::spin_up() {
       coarse->grid(), [&](const SolidFace& face) { return coarse->condition(face); }, solid);
   if (!solver) return tl::unexpected(std::move(solver.error()));
   SolidRadiation radiation(*coarse, *solver, geometry_, instant_, climate_, options_,
-                           scenario_.thermal.exchange);
+                           scenario_.thermal);
   // Advance from the steady profile to the start of the history.
   solver->set_temperature(start_s, steady);
   const auto reached = solver->advance(

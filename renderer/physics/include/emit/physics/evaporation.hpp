@@ -57,7 +57,7 @@ inline constexpr double kOpenStomataWM2 = 100.0;
                                             double shortwave_w_m2) noexcept;
 
 /// Returns k of q_e = k (e_s(T) - e_a), W m-2 Pa-1 (physics.md eq. 47), for the film of a face and
-/// a resistance of the surface. `film_frac` is the share that rain has wetted (eq. 51).
+/// a resistance of the surface. `film_frac` is the share that rain has wetted (eq. 64).
 [[nodiscard]] constexpr double evaporation_w_m2_pa(double film_w_m2_k, double wetness_frac,
                                                    double resistance_s_m, const MoistAir& air,
                                                    double film_frac = 0.0) noexcept {

@@ -146,7 +146,7 @@ struct Material {
   std::optional<double> wetness_frac;            ///< 0..1; absent: 1
   std::optional<double> surface_resistance_s_m;  ///< in sunlight; absent: 0
   std::optional<double> night_resistance_s_m;    ///< absent: the same as in sunlight
-  // foster: rain water (physics.md eq. 51 to 54).
+  // foster: rain water (physics.md eq. 61 to 64).
   std::optional<double> water_store_mm;  ///< what it holds; absent: rain leaves it as it is
   std::optional<double> readily_evaporable_mm;  ///< of the top layer of a soil; absent: no soil
   /// Temperature of a hot part or another emitter that takes no part in the thermal simulation.

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-/// Rain water on and in surfaces, and how it dries (physics.md eq. 51 to 54). Raw SI numbers, water
+/// Rain water on and in surfaces, and how it dries (physics.md eq. 61 to 64). Raw SI numbers, water
 /// as depth in mm, which is kg m-2. Any thread. RT-safe.
 namespace emit::physics {
 
