@@ -56,15 +56,18 @@ glm::dvec2 octahedral_from_unit(const glm::dvec3& n) noexcept {
   return p;
 }
 
-/// Returns the states of a steady profile between the initial surface temperature and the base.
-FosterState<double> initial_states(const FosterMaterial& material) noexcept {
+/// Returns the states of a steady profile between a surface temperature and the base.
+FosterState<double> initial_states(const FosterMaterial& material, double surface_k) noexcept {
   FosterState<double> x{};
-  const double flux_w_m2 =
-      (material.initial_k - material.base_k) / material.network.resistance_m2k_w();
+  const double flux_w_m2 = (surface_k - material.base_k) / material.network.resistance_m2k_w();
   for (std::size_t i = 0; i < material.network.count; ++i) {
     x[i] = material.network.modes[i].resistance_m2k_w * flux_w_m2;
   }
   return x;
+}
+
+FosterState<double> initial_states(const FosterMaterial& material) noexcept {
+  return initial_states(material, material.initial_k);
 }
 
 physics::FosterSurface<double> surface_of(const FosterMaterial& material,
@@ -320,12 +323,11 @@ void FosterHistory::carry_water(const HistoryInterval& interval, IntervalForcing
     WaterGround& now = ground_.water[s];
     if (!now.followed) {
       // Ground of which nothing was known has the temperature of the surroundings.
-      FosterMaterial start = ground;
-      start.initial_k =
+      const double around_k =
           surroundings_.prescribed()
               ? surroundings_.prescribed_k
               : reference_k_ + physics::foster_offset_k(ground_.surroundings, surroundings_surface_);
-      now = {initial_states(start), 0.0, true};
+      now = {initial_states(ground, around_k), 0.0, true};
     }
     const double rain_mm = std::max(0.0, interval.rain_mm);
     const bool wet = rain_mm > 0.0 || now.water_mm > 0.0;

@@ -179,8 +179,10 @@ TEST_F(ConfigTest, planes_see_the_sun_of_a_year) {
   for (const PlaneInstant& at : course->instants) {
     const double hour = std::fmod(at.time_s / 3600.0, 24.0);
     // The sun is in the east before noon, at this meridian of the zone. No plane has more than it.
-    if (hour > 8.0 && hour < 11.0) ASSERT_EQ(at.planes[3].beam_w_m2, 0.0) << at.time_s;
-    if (hour > 13.0 && hour < 16.0) ASSERT_EQ(at.planes[2].beam_w_m2, 0.0) << at.time_s;
+    const bool morning = hour > 8.0 && hour < 11.0;
+    const bool afternoon = hour > 13.0 && hour < 16.0;
+    ASSERT_TRUE(!morning || at.planes[3].beam_w_m2 == 0.0) << at.time_s;
+    ASSERT_TRUE(!afternoon || at.planes[2].beam_w_m2 == 0.0) << at.time_s;
     for (const PlaneIrradiance& plane : at.planes) {
       ASSERT_LE(plane.beam_w_m2, at.direct_normal_w_m2 + 1e-9);
     }

@@ -49,13 +49,14 @@ double surface_resistance_s_m(const MoistSurface& surface, double shortwave_w_m2
 
 void add_moisture(const MoistSurface& surface, const MoistAir& air, double shortwave_w_m2,
                   FosterDrive<double>& drive) noexcept {
+  // A face that is dry at one end of a step only has the air's vapour at both.
+  drive.vapour_pa = air.vapour_pa;
   if (surface.dry()) return;
   drive.evaporation_w_m2_pa =
       evaporation_w_m2_pa(drive.film_w_m2_k, surface.wetness_frac,
                           surface_resistance_s_m(surface, shortwave_w_m2), air,
                           surface.film_frac);
   drive.dew_w_m2_pa = evaporation_w_m2_pa(drive.film_w_m2_k, 1.0, 0.0, air);
-  drive.vapour_pa = air.vapour_pa;
 }
 
 }  // namespace emit::physics

@@ -24,9 +24,9 @@ vec2 latent_flux(float t, vec3 moist) {
 
 // Exchange of water under a film and a short-wave irradiance, as latent_flux() takes it. `water` holds the wetness
 // and the resistances in sunlight and without it in s/m, `wet_frac` is the share that rain has wetted. Without both
-// the surface is dry.
+// the surface is dry, and has the vapour of the air alone.
 vec3 moist_drive(vec3 water, float wet_frac, MoistAirParams air, float film_w_m2_k, float shortwave_w_m2) {
-  if (!(water.x > 0.0 || wet_frac > 0.0)) return vec3(0.0);
+  if (!(water.x > 0.0 || wet_frac > 0.0)) return vec3(0.0, 0.0, air.vapour_pa);
   float resistance_s_m = water.y;
   float light_frac = clamp(shortwave_w_m2 / air.stomata_w_m2, 0.0, 1.0);
   if (resistance_s_m > 0.0 && light_frac < 1.0) {

@@ -68,7 +68,7 @@ inline constexpr double kOpenStomataWM2 = 100.0;
 
 /// Gives the drive of a surface what it exchanges with the moisture of the air. The film of the
 /// drive must be that of the air alone. Dew forms without the resistance of the surface, on all of
-/// it. A dry surface keeps its drive.
+/// it. A dry surface takes the vapour alone.
 void add_moisture(const MoistSurface& surface, const MoistAir& air, double shortwave_w_m2,
                   FosterDrive<double>& drive) noexcept;
 
