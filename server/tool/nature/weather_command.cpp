@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -262,17 +263,18 @@ physics::Result<void> parse_planes(const std::string& text,
     const std::string_view item = rest.substr(0, rest.find(','));
     rest.remove_prefix(std::min(rest.size(), item.size() + 1));
     const std::size_t colon = item.find(':');
-    const auto azimuth = physics::csv_number(item.substr(0, colon));
-    const auto tilt = colon == std::string_view::npos ? std::nullopt
-                                                      : physics::csv_number(item.substr(colon + 1));
+    const auto number = [](std::string_view cell) {
+      return physics::csv_number(cell).value_or(std::numeric_limits<double>::quiet_NaN());
+    };
+    const double azimuth_deg = number(item.substr(0, colon));
+    const double tilt_deg = number(colon == std::string_view::npos ? "" : item.substr(colon + 1));
     // Numbers that are not finite fail the comparisons.
-    if (!azimuth || !tilt || !(*azimuth >= 0.0 && *azimuth <= 360.0) ||
-        !(*tilt >= 0.0 && *tilt <= 180.0)) {
+    if (!(azimuth_deg >= 0.0 && azimuth_deg <= 360.0) || !(tilt_deg >= 0.0 && tilt_deg <= 180.0)) {
       return physics::make_error(
           physics::ErrorCode::invalid_argument,
           fmt::format("--planes: '{}' is not AZIMUTH:TILT, 0 to 360 and 0 to 180 degrees", item));
     }
-    out.push_back({*azimuth, *tilt});
+    out.push_back({azimuth_deg, tilt_deg});
   }
   if (!out.empty()) return {};
   return physics::make_error(physics::ErrorCode::invalid_argument, "--planes names no plane");
