@@ -46,9 +46,12 @@ EntityAir entity_air(const PoseHistory& entity, const IntervalForcing& forcing,
     return physics::moist_air(flow.air_k, flow.pressure_pa,
                               humidity_frac * physics::saturation_over_water_pa(flow.air_k));
   };
-  return {physics::air_film(begin, entity.film_body()), physics::air_film(end, entity.film_body()),
-          physics::felt_air_k(begin), physics::felt_air_k(end),
-          moist_at(forcing.begin, begin), moist_at(forcing.end, end)};
+  return {physics::air_film(begin, entity.film_body()),
+          physics::air_film(end, entity.film_body()),
+          physics::felt_air_k(begin),
+          physics::felt_air_k(end),
+          moist_at(forcing.begin, begin),
+          moist_at(forcing.end, end)};
 }
 
 }  // namespace emit::renderer

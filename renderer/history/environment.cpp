@@ -16,8 +16,8 @@ bool same_weather(const physics::WeatherSample& a, const physics::WeatherSample&
          a.longwave_down_w_m2 == b.longwave_down_w_m2 && a.air_k == b.air_k &&
          a.wind_m_s == b.wind_m_s && a.cloud_frac == b.cloud_frac &&
          a.environment_k == b.environment_k && a.film_w_m2_k == b.film_w_m2_k &&
-         a.wind_from_rad == b.wind_from_rad && a.relative_humidity_frac == b.relative_humidity_frac &&
-         a.rain_mm_h == b.rain_mm_h;
+         a.wind_from_rad == b.wind_from_rad &&
+         a.relative_humidity_frac == b.relative_humidity_frac && a.rain_mm_h == b.rain_mm_h;
 }
 
 }  // namespace
@@ -89,7 +89,8 @@ double Environment::rain_until_mm(std::int64_t sim_time_ns) const noexcept {
   const auto after = std::ranges::upper_bound(changes_ns_, sim_time_ns);
   if (after == changes_ns_.begin()) return table_rain_.at_mm(sim_time_ns);
   const auto i = static_cast<std::size_t>(after - changes_ns_.begin()) - 1;
-  // A live row rains until the next one. Where rows between were thinned out, the depths still hold.
+  // A live row rains until the next one. Where rows between were thinned out, the depths still
+  // hold.
   constexpr double kNsPerH = 3.6e12;
   const double passed_ns = static_cast<double>(sim_time_ns - changes_ns_[i]);
   if (after == changes_ns_.end()) {

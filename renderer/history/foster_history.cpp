@@ -174,8 +174,8 @@ bool dry_alike(const FosterMaterial& a, const FosterMaterial& b) noexcept {
          a.network.resistance_m2k_w() == b.network.resistance_m2k_w();
 }
 
-/// Gives the materials that hold water their slots. Materials beyond the last slot share that of the
-/// store whose capacity is closest by ratio.
+/// Gives the materials that hold water their slots. Materials beyond the last slot share that of
+/// the store whose capacity is closest by ratio.
 void number_water(std::vector<FosterMaterial>& materials) {
   std::vector<std::size_t> owners;
   for (std::size_t m = 0; m < materials.size(); ++m) {
@@ -305,10 +305,10 @@ SurfaceForcing FosterHistory::forcing(const physics::SunPosition& sun,
 }
 
 void FosterHistory::look_for_water(const Environment& environment) noexcept {
-  has_water_ = environment.rains() ||
-               std::ranges::any_of(water_grounds_, [](const FosterMaterial& ground) {
-                 return ground.store.initial_mm > 0.0;
-               });
+  has_water_ =
+      environment.rains() || std::ranges::any_of(water_grounds_, [](const FosterMaterial& ground) {
+        return ground.store.initial_mm > 0.0;
+      });
 }
 
 void FosterHistory::carry_water(const HistoryInterval& interval, IntervalForcing& out) noexcept {
@@ -323,10 +323,10 @@ void FosterHistory::carry_water(const HistoryInterval& interval, IntervalForcing
     WaterGround& now = ground_.water[s];
     if (!now.followed) {
       // Ground of which nothing was known has the temperature of the surroundings.
-      const double around_k =
-          surroundings_.prescribed()
-              ? surroundings_.prescribed_k
-              : reference_k_ + physics::foster_offset_k(ground_.surroundings, surroundings_surface_);
+      const double around_k = surroundings_.prescribed()
+                                  ? surroundings_.prescribed_k
+                                  : reference_k_ + physics::foster_offset_k(ground_.surroundings,
+                                                                            surroundings_surface_);
       now = {initial_states(ground, around_k), 0.0, true};
     }
     const double rain_mm = std::max(0.0, interval.rain_mm);
@@ -348,8 +348,8 @@ void FosterHistory::carry_water(const HistoryInterval& interval, IntervalForcing
       FosterDrive<double> out_drive = physics::lerp(dry[0], dry[1], f);
       if (!(wet_frac > 0.0)) return out_drive;
       const FosterDrive<double> wet_drive = physics::lerp(open[0], open[1], f);
-      out_drive.evaporation_w_m2_pa = std::lerp(out_drive.evaporation_w_m2_pa,
-                                                wet_drive.evaporation_w_m2_pa, wet_frac);
+      out_drive.evaporation_w_m2_pa =
+          std::lerp(out_drive.evaporation_w_m2_pa, wet_drive.evaporation_w_m2_pa, wet_frac);
       out_drive.dew_w_m2_pa = wet_drive.dew_w_m2_pa;
       out_drive.vapour_pa = wet_drive.vapour_pa;
       return out_drive;
@@ -372,16 +372,15 @@ void FosterHistory::carry_water(const HistoryInterval& interval, IntervalForcing
       const double to = (part + 1.0) / parts;
       const double dt_s = out.dt_s / parts;
       const double begin_mm_s = open_mm_s(from);
-      const double expected_mm = physics::advance_water(ground.store, now.water_mm, rain_mm / parts,
-                                                        begin_mm_s, dt_s)
-                                     .water_mm;
-      physics::foster_step(now.modes_k,
-                           drive_at(from, physics::wet_frac(ground.store, now.water_mm)),
-                           drive_at(to, physics::wet_frac(ground.store, expected_mm)),
-                           ladder.level[level], surface);
+      const double expected_mm =
+          physics::advance_water(ground.store, now.water_mm, rain_mm / parts, begin_mm_s, dt_s)
+              .water_mm;
+      physics::foster_step(
+          now.modes_k, drive_at(from, physics::wet_frac(ground.store, now.water_mm)),
+          drive_at(to, physics::wet_frac(ground.store, expected_mm)), ladder.level[level], surface);
       const double mean_mm_s = 0.5 * (begin_mm_s + open_mm_s(to));
-      const physics::StoredWater after = physics::advance_water(
-          ground.store, now.water_mm, rain_mm / parts, mean_mm_s, dt_s);
+      const physics::StoredWater after =
+          physics::advance_water(ground.store, now.water_mm, rain_mm / parts, mean_mm_s, dt_s);
       now.water_mm = after.water_mm;
       if (mean_mm_s > 0.0) {
         evaporated_mm += after.evaporated_mm;
@@ -447,7 +446,8 @@ void FosterHistory::spin_up_surroundings(const Environment& environment) noexcep
   look_for_water(environment);
   ground_ = {};
   for (std::size_t s = 0; s < water_grounds_.size() && has_water_; ++s) {
-    ground_.water[s] = {initial_states(water_grounds_[s]), water_grounds_[s].store.initial_mm, true};
+    ground_.water[s] = {initial_states(water_grounds_[s]), water_grounds_[s].store.initial_mm,
+                        true};
   }
   ground_.surroundings =
       surroundings_.prescribed() ? FosterState<double>{} : initial_states(surroundings_);

@@ -124,8 +124,8 @@ class FosterHistory {
   std::uint32_t grid_nodes_ = 2;
 
   physics::FosterSurface<double> surroundings_surface_;
-  GroundState ground_;           ///< current state
-  GroundState ground_at_start_;  ///< state at the history's start
+  GroundState ground_;                         ///< current state
+  GroundState ground_at_start_;                ///< state at the history's start
   std::vector<FosterMaterial> water_grounds_;  ///< a material of each slot
   std::vector<physics::FosterSurface<double>> water_surfaces_;
   bool has_water_ = false;  ///< it rains, or some ground starts moist

@@ -22,7 +22,7 @@ struct HistoryInterval {
   physics::Forcing forcing_begin;
   physics::Forcing forcing_end;
   double rain_mm = 0.0;  ///< depth that falls in it
-  bool sun_up = false;  ///< true when the sun needs a shadow map
+  bool sun_up = false;   ///< true when the sun needs a shadow map
 };
 
 /// Intervals from the history's start to a frame's instant, in order of time. Their number is fixed

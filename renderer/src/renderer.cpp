@@ -308,8 +308,7 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
       clock_(output.stage_timing) {
   scene_stats_.warnings.insert(scene_stats_.warnings.end(), geometry.warnings.begin(),
                                geometry.warnings.end());
-  const std::vector<std::uint32_t> bare =
-      scene::materials_without_rain(scenario.thermal, geometry);
+  const std::vector<std::uint32_t> bare = scene::materials_without_rain(scenario.thermal, geometry);
   unknown_wet_ = static_cast<std::uint32_t>(bare.size());
   if (!bare.empty() && history_.environment.rains()) {
     std::vector<std::string_view> names;
@@ -664,7 +663,7 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
   prepare(request, level);
   view.stats.coarse = stage_->coarse_from(request.sensor_pose) || view.stats.rewarm_s > 0.0 ||
                       is_beyond_sensor(fov_of(request));
-  // In six hours 0.5 mm dry by day; by night they may last longer.
+  // Half a millimetre dries within six hours by day; by night it may last longer.
   constexpr std::int64_t kWetNs = 6 * 3'600'000'000'000;
   constexpr double kLeastMm = 0.05;
   const bool rained = history_.environment.rain_mm(request.thermal_time_ns - kWetNs,

@@ -95,8 +95,8 @@ protocol::EnvironmentData CigiWeather::at(std::int64_t sim_time_ns) const noexce
       model.air_amplitude_k = 0.0;
       model.wind_m_s = wind_m_s_;
       if (humidity_frac_) {
-        model.dew_point_k = physics::dew_point_k(*humidity_frac_ *
-                                                 physics::saturation_over_water_pa(*air_k_));
+        model.dew_point_k =
+            physics::dew_point_k(*humidity_frac_ * physics::saturation_over_water_pa(*air_k_));
       }
     }
     if (cloud_frac_) model.cloud_frac = *cloud_frac_;

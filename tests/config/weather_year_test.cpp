@@ -134,6 +134,48 @@ TEST_F(ConfigTest, epw_hours_end_where_they_say_and_keep_their_averages) {
   }
 }
 
+TEST_F(ConfigTest, epw_every_hour_of_the_year_is_that_of_the_file) {
+  const auto hours = made_year();
+  write("w.epw", epw(hours));
+  // The epoch is new year, local standard time, of a year without a leap day.
+  const auto loaded = scenario(
+      "epoch_utc = 2023-01-01T07:00:00Z\n[place]\nlat_deg = 40.0\nlon_deg = -105.0\n"
+      "height_m = 1500\n[weather]\nfile = \"w.epw\"\n");
+  ASSERT_TRUE(loaded) << loaded.error().text;
+  const auto first = std::ranges::lower_bound(loaded->weather, std::int64_t{0}, {},
+                                              &scene::WeatherSample::sim_time_ns);
+  ASSERT_EQ(first->sim_time_ns, 0);
+  ASSERT_EQ(hours.size(), 8760U);
+  double beam_off = 0.0;
+  double beam_sum = 0.0;
+  double diffuse_off = 0.0;
+  double diffuse_sum = 0.0;
+  for (std::size_t i = 0; i < hours.size(); ++i) {
+    const auto* rows = &*(first + static_cast<std::ptrdiff_t>(4 * i));
+    // Values of an instant are there at the end of their hour.
+    ASSERT_EQ(rows[4].sim_time_ns, static_cast<std::int64_t>(i + 1) * kHourNs);
+    ASSERT_NEAR(rows[4].air_k, physics::kZeroCelsiusK + hours[i].air_c, 1e-9) << i;
+    ASSERT_NEAR(rows[4].longwave_down_w_m2, 300.0, 1e-9) << i;
+    ASSERT_NEAR(rows[4].wind_m_s, 3.5, 1e-9) << i;
+    ASSERT_NEAR(*rows[4].wind_from_rad, std::numbers::pi, 1e-9) << i;
+    const auto mean = [&](double scene::WeatherSample::*member) {
+      return 0.125 * (rows[0].*member + rows[4].*member) +
+             0.25 * (rows[1].*member + rows[2].*member + rows[3].*member);
+    };
+    beam_off +=
+        std::abs(mean(&scene::WeatherSample::direct_normal_w_m2) - hours[i].beam_w_m2);
+    diffuse_off +=
+        std::abs(mean(&scene::WeatherSample::diffuse_horizontal_w_m2) - hours[i].diffuse_w_m2);
+    beam_sum += hours[i].beam_w_m2;
+    diffuse_sum += hours[i].diffuse_w_m2;
+  }
+  // The made sun also shines in some minutes before sunrise and after sunset of winter.
+  EXPECT_LT(beam_off, 0.01 * beam_sum);
+  EXPECT_LT(diffuse_off, 0.01 * diffuse_sum);
+  std::printf("beam off by %.4f of its sum, diffuse by %.4f\n", beam_off / beam_sum,
+              diffuse_off / diffuse_sum);
+}
+
 TEST_F(ConfigTest, epw_rain_falls_in_its_hour) {
   auto hours = made_year();
   for (Hour& h : hours) {
@@ -164,8 +206,8 @@ TEST_F(ConfigTest, epw_rain_falls_in_its_hour) {
 
 TEST_F(ConfigTest, planes_see_the_sun_of_a_year) {
   const auto file = write("w.epw", epw(made_year()));
-  const std::vector<WeatherPlane> planes{{0.0, 0.0}, {180.0, 90.0}, {90.0, 90.0}, {270.0, 90.0},
-                                         {0.0, 180.0}};
+  const std::vector<WeatherPlane> planes{
+      {0.0, 0.0}, {180.0, 90.0}, {90.0, 90.0}, {270.0, 90.0}, {0.0, 180.0}};
   const auto course = weather_on_planes(file, {}, planes, 900.0);
   ASSERT_TRUE(course) << course.error().text;
   ASSERT_EQ(course->instants.size(), 365U * 96U + 1U);
@@ -186,10 +228,10 @@ TEST_F(ConfigTest, planes_see_the_sun_of_a_year) {
     for (const PlaneIrradiance& plane : at.planes) {
       ASSERT_LE(plane.beam_w_m2, at.direct_normal_w_m2 + 1e-9);
     }
-    ASSERT_NEAR(at.planes[0].beam_w_m2,
-                at.direct_normal_w_m2 *
-                    std::max(0.0, std::sin(at.sun_elevation_deg * physics::kDegree)),
-                1e-6);
+    ASSERT_NEAR(
+        at.planes[0].beam_w_m2,
+        at.direct_normal_w_m2 * std::max(0.0, std::sin(at.sun_elevation_deg * physics::kDegree)),
+        1e-6);
   }
   // A table needs a place.
   const auto table = write("w.csv",
@@ -203,8 +245,8 @@ TEST_F(ConfigTest, planes_see_the_sun_of_a_year) {
   const auto noon = weather_on_planes(table, origin, planes, 1800.0);
   ASSERT_TRUE(noon) << noon.error().text;
   ASSERT_EQ(noon->instants.size(), 3U);
-  EXPECT_NEAR(noon->instants[0].planes[0].beam_w_m2,
-              500.0 * std::cos(23.44 * physics::kDegree), 1.0);
+  EXPECT_NEAR(noon->instants[0].planes[0].beam_w_m2, 500.0 * std::cos(23.44 * physics::kDegree),
+              1.0);
 }
 
 TEST_F(ConfigTest, epw_days_go_on_into_other_years_and_over_leap_days) {
@@ -420,8 +462,8 @@ TEST_P(WeatherDriver, PlanesSeeTheSunOfAnotherProgram) {
 }
 
 TEST_P(WeatherDriver, PlanesOfASimulationAreThoseOfAnotherProgram) {
-  // What a simulation uses follows the clear sky within an hour, where the other program has a
-  // straight line between the middles of hours. Means differ less than instants.
+  // A simulation follows the clear sky within an hour, where the other program has a straight line
+  // between the middles of hours. Means differ less than instants.
   std::vector<WeatherPlane> planes;
   std::vector<std::vector<double>> wanted;
   for (const int azimuth_deg : {0, 90, 180, 270, 315, 45}) {
@@ -450,8 +492,8 @@ TEST_P(WeatherDriver, PlanesOfASimulationAreThoseOfAnotherProgram) {
     const double count = static_cast<double>(wanted[p].size());
     const double rms_w_m2 = std::sqrt(squares / count);
     std::printf("%s azimuth %3.0f tilt %2.0f: mean %6.1f, reference %6.1f W/m2, RMS %5.1f\n",
-                GetParam(), planes[p].azimuth_deg, planes[p].tilt_deg, ours / count,
-                theirs / count, rms_w_m2);
+                GetParam(), planes[p].azimuth_deg, planes[p].tilt_deg, ours / count, theirs / count,
+                rms_w_m2);
     EXPECT_NEAR(ours, theirs, 0.04 * theirs) << p;
     EXPECT_LT(rms_w_m2, 36.0) << p;
   }

@@ -278,9 +278,10 @@ const KeyTable<Material>& material_keys() {
                        EMIT_FIELD(night_resistance_s_m),
                        "foster: the same without sunlight, when stomata are closed. Without it "
                        "that in sunlight counts."),
-      number<Material>("water_store_mm", "mm", above_to(0, 200), EMIT_FIELD(water_store_mm),
-                       "foster: rain that the surface holds, 0.5 on asphalt, 2 on grass. Without it "
-                       "rain leaves the surface as it is. See Evaporation."),
+      number<Material>(
+          "water_store_mm", "mm", above_to(0, 200), EMIT_FIELD(water_store_mm),
+          "foster: rain that the surface holds, 0.5 on asphalt, 2 on grass. Without it "
+          "rain leaves the surface as it is. See Evaporation."),
       number<Material>("readily_evaporable_mm", "mm", above_to(0, 100),
                        EMIT_FIELD(readily_evaporable_mm),
                        "foster: part of the store that evaporates as freely as open water, 2 of "

@@ -290,9 +290,9 @@ Result<WeatherYear> read_tmy3(Lines lines) {
   const auto header = lines.cells();
   std::vector<std::pair<std::size_t, const Field*>> columns;
   // Faces can do without the direction of the wind, and rain is often not recorded.
-  for (const auto& [name, field] : {std::pair<std::string_view, const Field*>{"Wdir (degrees)",
-                                                                              &kDirection},
-                                    {"Lprecip depth (mm)", &kRain}}) {
+  for (const auto& [name, field] :
+       {std::pair<std::string_view, const Field*>{"Wdir (degrees)", &kDirection},
+        {"Lprecip depth (mm)", &kRain}}) {
     const auto found = std::find(header.begin(), header.end(), name);
     if (found != header.end()) {
       columns.emplace_back(static_cast<std::size_t>(found - header.begin()), field);

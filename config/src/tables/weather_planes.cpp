@@ -99,9 +99,8 @@ Result<PlaneCourse> weather_on_planes(const std::filesystem::path& file,
     row.sun_azimuth_deg = sun.azimuth.value() / physics::kDegree;
     row.sun_elevation_deg = sun.elevation.value() / physics::kDegree;
     // The sun below the horizon counts as none, as in every simulation.
-    row.direct_normal_w_m2 = row.sun_elevation_deg > 0.0
-                                 ? weather.direct_normal_w_m2 * (1.0 - weather.cloud_frac)
-                                 : 0.0;
+    row.direct_normal_w_m2 =
+        row.sun_elevation_deg > 0.0 ? weather.direct_normal_w_m2 * (1.0 - weather.cloud_frac) : 0.0;
     row.diffuse_horizontal_w_m2 = weather.diffuse_horizontal_w_m2;
     row.longwave_down_w_m2 = weather.longwave_down_w_m2;
     row.air_k = weather.air_k;

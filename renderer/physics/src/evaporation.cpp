@@ -54,8 +54,7 @@ void add_moisture(const MoistSurface& surface, const MoistAir& air, double short
   if (surface.dry()) return;
   drive.evaporation_w_m2_pa =
       evaporation_w_m2_pa(drive.film_w_m2_k, surface.wetness_frac,
-                          surface_resistance_s_m(surface, shortwave_w_m2), air,
-                          surface.film_frac);
+                          surface_resistance_s_m(surface, shortwave_w_m2), air, surface.film_frac);
   drive.dew_w_m2_pa = evaporation_w_m2_pa(drive.film_w_m2_k, 1.0, 0.0, air);
 }
 

@@ -62,7 +62,7 @@ class SolidRadiation {
   std::vector<double> sun_frac_, direct_w_m2_;
   std::vector<Incoming> incoming_;
   std::vector<double> wet_frac_;  ///< of level ground, by material
-  double left_w_m2_ = 0.0;  ///< greatest result of SceneExchange::incoming()
+  double left_w_m2_ = 0.0;        ///< greatest result of SceneExchange::incoming()
 };
 
 /// History of a voxel model under a scenario's forcing. It has a spin-up on a coarse grid, then one

@@ -267,8 +267,7 @@ Result<SurfaceClimate> SurfaceClimate::create(const scene::ScenarioDesc& scenari
                                                  climate.reflectance_frac_)});
     }
     LayerSolver solver(*mesh, options.steps);
-    const auto profile =
-        steady_profile(solid_layers(ground->layers), initial_k, ground->base_k);
+    const auto profile = steady_profile(solid_layers(ground->layers), initial_k, ground->base_k);
     face_history(solver, profile, rows, surface.emissivity_frac, times_s, ground_k);
   }
   for (std::size_t i = 0; i < climate.nodes_.size(); ++i) {

@@ -91,8 +91,7 @@ WaterCourse water_course(std::span<const ClimateNode> nodes, const scene::Materi
     if (dt_s > 0.0) {
       const double rain_mm_s = (b.rain_mm - a.rain_mm) / dt_s;
       const double begin_mm_s = open_mm_s(a);
-      const double expected_mm =
-          later_mm(store, water_mm, rain_mm_s, begin_mm_s, begin_mm_s, dt_s);
+      const double expected_mm = later_mm(store, water_mm, rain_mm_s, begin_mm_s, begin_mm_s, dt_s);
       const double end_s = static_cast<double>(b.time_ns - nodes.front().time_ns) * 1e-9;
       solver.advance({solver.time_s(), end_s, face_at(a, wetness(store, water_mm)),
                       face_at(b, wetness(store, expected_mm))},

@@ -136,10 +136,8 @@ Result<std::vector<std::size_t>> MaterialLookup::resolve(std::uint32_t object_in
 void MaterialLookup::warn_of_moisture() {
   std::vector<std::string_view> moist;
   std::vector<std::string_view> wet;  // without a resistance: soil or water
-  const bool rains =
-      std::ranges::any_of(scenario_->weather, [](const physics::WeatherSample& row) {
-        return row.rain_mm_h > 0.0;
-      });
+  const bool rains = std::ranges::any_of(
+      scenario_->weather, [](const physics::WeatherSample& row) { return row.rain_mm_h > 0.0; });
   for (std::size_t i = 0; i < library_.size(); ++i) {
     const physics::MoistSurface moisture = moisture_of(library_[i]);
     const physics::WaterStore store = water_store_of(library_[i]);

@@ -46,10 +46,10 @@ bool weather_matters(const SurfaceNode& node, std::int64_t now_ns, const Environ
   for (const glm::dvec3& normal :
        {glm::dvec3(0.0, 0.0, 1.0), glm::dvec3(1.0, 0.0, 0.0), glm::dvec3(-1.0, 0.0, 0.0),
         glm::dvec3(0.0, 1.0, 0.0), glm::dvec3(0.0, -1.0, 0.0)}) {
-    film_change_w_m2_k = std::max(
-        film_change_w_m2_k,
-        std::abs(film_of(is, normal) -
-                 between(film_of(taken.begin, normal), film_of(taken.end, normal), way)));
+    film_change_w_m2_k =
+        std::max(film_change_w_m2_k,
+                 std::abs(film_of(is, normal) -
+                          between(film_of(taken.begin, normal), film_of(taken.end, normal), way)));
   }
   // Bound the change of the flux into a surface by the sum of the changes of all its parts.
   double change_w_m2 =
@@ -66,8 +66,7 @@ bool weather_matters(const SurfaceNode& node, std::int64_t now_ns, const Environ
   // Water matters by the heat that takes it away: 0.01 mm are 24 kJ/m2.
   constexpr double kRainMm = 0.01;
   const std::int64_t begin_ns = node.at_ns - std::llround(1e9 * taken.dt_s);
-  const double rain_change_mm =
-      std::abs(environment.rain_mm(begin_ns, node.at_ns) - taken.rain_mm);
+  const double rain_change_mm = std::abs(environment.rain_mm(begin_ns, node.at_ns) - taken.rain_mm);
   return change_w_m2 > kMinChangeWM2K * tolerance_k || rain_change_mm > kRainMm;
 }
 

@@ -68,8 +68,7 @@ std::string with_spread(double value, double half) {
 std::string evaporation_text(const Material& material) {
   const physics::MoistSurface water = scene::moisture_of(material);
   const physics::WaterStore store = scene::water_store_of(material);
-  const std::string rain =
-      store.none() ? "" : fmt::format("{:.3g} mm of rain", store.capacity_mm);
+  const std::string rain = store.none() ? "" : fmt::format("{:.3g} mm of rain", store.capacity_mm);
   if (water.dry()) return rain.empty() ? "-" : rain;
   std::string text = fmt::format("{:.3g} of full", water.wetness_frac);
   if (water.resistance_s_m > 0.0) {

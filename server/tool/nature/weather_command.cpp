@@ -272,17 +272,18 @@ physics::Result<void> parse_planes(const std::string& text,
     if (!(azimuth_deg >= 0.0 && azimuth_deg <= 360.0) || !(tilt_deg >= 0.0 && tilt_deg <= 180.0)) {
       return physics::make_error(
           physics::ErrorCode::invalid_argument,
-          fmt::format("--planes: '{}' is not AZIMUTH:TILT, 0 to 360 and 0 to 180 degrees", item));
+          fmt::format("'{}' is not AZIMUTH:TILT, 0 to 360 and 0 to 180 degrees", item));
     }
     out.push_back({azimuth_deg, tilt_deg});
   }
   if (!out.empty()) return {};
-  return physics::make_error(physics::ErrorCode::invalid_argument, "--planes names no plane");
+  return physics::make_error(physics::ErrorCode::invalid_argument, "names no plane");
 }
 
 std::string planes_csv_text(const WeatherOptions& options, const config::PlaneCourse& course) {
-  std::string out = "time_s,sun_azimuth_deg,sun_elevation_deg,dni_w_m2,dhi_w_m2,longwave_down_w_m2,"
-                    "air_k,wind_m_s,rain_mm_h";
+  std::string out =
+      "time_s,sun_azimuth_deg,sun_elevation_deg,dni_w_m2,dhi_w_m2,longwave_down_w_m2,"
+      "air_k,wind_m_s,rain_mm_h";
   for (const config::WeatherPlane& plane : options.planes) {
     const std::string name = fmt::format("{:g}_{:g}_w_m2", plane.azimuth_deg, plane.tilt_deg);
     out += fmt::format(",beam_{},sky_{}", name, name);
@@ -305,10 +306,10 @@ void print_planes(std::FILE* out, const WeatherOptions& options,
                   const config::PlaneCourse& course) {
   fmt::print(out, "{:<22}{:>12}{:>12}\n", "plane: azimuth, tilt", "beam kWh/m2", "sky kWh/m2");
   for (std::size_t p = 0; p < options.planes.size(); ++p) {
-    fmt::print(out, "{:<22}{:>12.1f}{:>12.1f}\n",
-               fmt::format("{:g}, {:g} deg", options.planes[p].azimuth_deg,
-                           options.planes[p].tilt_deg),
-               course.sums[p].beam_kwh_m2, course.sums[p].sky_kwh_m2);
+    fmt::print(
+        out, "{:<22}{:>12.1f}{:>12.1f}\n",
+        fmt::format("{:g}, {:g} deg", options.planes[p].azimuth_deg, options.planes[p].tilt_deg),
+        course.sums[p].beam_kwh_m2, course.sums[p].sky_kwh_m2);
   }
   fmt::print(out, "\n");
 }
@@ -391,11 +392,12 @@ void add_options(CommandLine& line, WeatherOptions& options) {
   line.output_file("--plot", options.plot, "Diagrams: SVG file");
   add_json(line, options.json);
   const Option planes =
-      line.parsed("--planes",
-                  [&options](const std::string& text) { return parse_planes(text, options.planes); },
-                  "Instead of the report: sun and sky light on planes over the file's year, with the "
-                  "sun of a simulation. Azimuth of the normal clockwise from north, tilt from level, "
-                  "as 180:90,270:30. The ground reflects nothing, the sky is the same all over")
+      line.parsed(
+              "--planes",
+              [&options](const std::string& text) { return parse_planes(text, options.planes); },
+              "Instead of the report: sun and sky light on planes over the file's year, with the "
+              "sun of a simulation. Azimuth of the normal clockwise from north, tilt from level, "
+              "as 180:90,270:30. The ground reflects nothing, the sky is the same all over")
           .type_name("AZIMUTH:TILT,...");
   line.output_file("--planes-csv", options.planes_csv,
                    "Instants of --planes: CSV file, in seconds of local standard time since 1 "

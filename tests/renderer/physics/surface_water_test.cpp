@@ -27,12 +27,12 @@ TEST(SurfaceWater, WetnessIsThatOfTheSources) {
   EXPECT_NEAR(wet_frac(kAsphalt, 0.06), 0.25, 1e-12);
   EXPECT_EQ(wet_frac(kAsphalt, 0.0), 0.0);
   EXPECT_EQ(wet_frac({}, 1.0), 0.0);
-  // FAO-56 eq. 74, as another program has it: soil of 20.003 mm, of which 9 mm evaporate freely. The
-  // numbers are the depth that has evaporated and the coefficient Kr of the day after.
+  // FAO-56 eq. 74, as another program has it: soil of 20.003 mm, of which 9 mm evaporate freely.
+  // The numbers are the depth that has evaporated and the coefficient Kr of the day after.
   const WaterStore soil{.kind = WaterStore::Kind::soil, .capacity_mm = 20.003, .ready_mm = 9.0};
-  for (const auto& [gone_mm, kr] : {std::pair{7.063, 1.0}, std::pair{15.185, 0.438},
-                                    std::pair{9.669, 0.939}, std::pair{9.261, 0.976},
-                                    std::pair{18.044, 0.178}, std::pair{20.003, 0.0}}) {
+  for (const auto& [gone_mm, kr] :
+       {std::pair{7.063, 1.0}, std::pair{15.185, 0.438}, std::pair{9.669, 0.939},
+        std::pair{9.261, 0.976}, std::pair{18.044, 0.178}, std::pair{20.003, 0.0}}) {
     EXPECT_NEAR(wet_frac(soil, 20.003 - gone_mm), kr, 6e-4) << gone_mm;
   }
   for (const double wetness : {0.0, 0.3, 0.99}) {
@@ -72,12 +72,12 @@ TEST(SurfaceWater, SoilDriesLikeMeasuredSoils) {
     double worst = 0.0;
     for (double days = 2.0; days <= 10.0; days += 1.0) {
       const double first_days = soil.u_mm / kOpenMmDay;
-      const double measured_mm =
-          days < first_days ? kOpenMmDay * days
-                            : soil.u_mm + soil.alpha_mm * std::sqrt(days - first_days);
-      const double ours_mm = advance_water(soil.store, soil.store.capacity_mm, 0.0,
-                                           kOpenMmDay / kDayS, days * kDayS)
-                                 .evaporated_mm;
+      const double measured_mm = days < first_days
+                                     ? kOpenMmDay * days
+                                     : soil.u_mm + soil.alpha_mm * std::sqrt(days - first_days);
+      const double ours_mm =
+          advance_water(soil.store, soil.store.capacity_mm, 0.0, kOpenMmDay / kDayS, days * kDayS)
+              .evaporated_mm;
       worst = std::max(worst, std::abs(ours_mm / measured_mm - 1.0));
     }
     EXPECT_LT(worst, 0.15) << soil.u_mm;

@@ -232,7 +232,8 @@ scene::ScenarioDesc shower(double rain_mm_h) {
 template <class At>
 double dry_h(const At& wet_at, double share) {
   for (std::int64_t t = kHourNs / 2; t <= 24 * kHourNs; t += kMinuteNs) {
-    if (wet_at(t) < share) return static_cast<double>(t - kHourNs / 2) / static_cast<double>(kHourNs);
+    if (wet_at(t) < share)
+      return static_cast<double>(t - kHourNs / 2) / static_cast<double>(kHourNs);
   }
   return 24.0;
 }
@@ -272,16 +273,16 @@ TEST(ReferenceRain, GroundDriesAsTheReferenceDoes) {
     // Compare the water itself.
     const auto mesh = reference::material_mesh(*material);
     ASSERT_TRUE(mesh.has_value());
-    const auto water = reference::water_course(
-        climate->nodes(), *material, material->initial_k.value_or(wet.thermal.initial_k),
-        climate->surroundings_reflectance_frac(), *mesh);
+    const auto water = reference::water_course(climate->nodes(), *material,
+                                               material->initial_k.value_or(wet.thermal.initial_k),
+                                               climate->surroundings_reflectance_frac(), *mesh);
     ASSERT_FALSE(water.empty());
     const auto model_wet = [&](std::int64_t t) {
       const auto after = std::ranges::upper_bound(nodes_ns, t);
-      const auto i = std::min(static_cast<std::size_t>(after - nodes_ns.begin()) - 1,
-                              forcing->size() - 1);
-      const double way = static_cast<double>(t - nodes_ns[i]) /
-                         static_cast<double>(nodes_ns[i + 1] - nodes_ns[i]);
+      const auto i =
+          std::min(static_cast<std::size_t>(after - nodes_ns.begin()) - 1, forcing->size() - 1);
+      const double way =
+          static_cast<double>(t - nodes_ns[i]) / static_cast<double>(nodes_ns[i + 1] - nodes_ns[i]);
       return std::lerp((*forcing)[i].begin.wet_frac[0], (*forcing)[i].end.wet_frac[0], way);
     };
     const auto true_wet = [&](std::int64_t t) { return water.at(t); };
@@ -293,9 +294,10 @@ TEST(ReferenceRain, GroundDriesAsTheReferenceDoes) {
     EXPECT_LT(worst_k, 1.5) << name;
     EXPECT_GT(cooler_k, 2.0) << name;
     EXPECT_NEAR(model_h, truth_h, 0.1 + 0.1 * truth_h) << name;
-    std::printf("%-18s rms %.3f K, max %.3f K; up to %.1f K cooler than dry; wetness below 0.1 "
-                "after %.2f h, reference %.2f h\n",
-                name, rms_k, worst_k, cooler_k, model_h, truth_h);
+    std::printf(
+        "%-18s rms %.3f K, max %.3f K; up to %.1f K cooler than dry; wetness below 0.1 "
+        "after %.2f h, reference %.2f h\n",
+        name, rms_k, worst_k, cooler_k, model_h, truth_h);
   }
 }
 

@@ -68,7 +68,7 @@ TEST(CigiWeather, HumidityAndDirectionOfTheWindReachTheSurfaces) {
   ASSERT_TRUE(weather.take(packet));
   const auto dry = weather.take_change(0);
   EXPECT_LT(dry->longwave_down_w_m2, moist->longwave_down_w_m2 - 20.0);
-  // Of 0 % the scenario's holds: a host that knows none sends it.
+  // A host that knows no humidity sends 0 %: the scenario's holds.
   packet.humidity_percent = 0;
   ASSERT_TRUE(weather.take(packet));
   const auto unknown = weather.take_change(0);

@@ -43,8 +43,9 @@ struct IntervalForcing {
 /// Forcing over the intervals between the instants `nodes_ns` (sim time). Entry i goes from node i
 /// to node i + 1. With the model emit2014 the surroundings have the temperature of the weather and
 /// reflect nothing. With foster they are an open, level surface that is steady at the first node
-/// and is integrated along, as is the ground of those `materials` that hold water. Thread: any. Errors: invalid_argument (fewer than two nodes, or nodes
-/// that do not ascend), config (the material of the surroundings does not exist).
+/// and is integrated along, as is the ground of those `materials` that hold water. Thread: any.
+/// Errors: invalid_argument (fewer than two nodes, or nodes that do not ascend), config (the
+/// material of the surroundings does not exist).
 [[nodiscard]] physics::Result<std::vector<IntervalForcing>> surface_forcing(
     const scene::ScenarioDesc& scenario, std::span<const std::int64_t> nodes_ns,
     std::span<const scene::Material> materials = {});
@@ -76,8 +77,8 @@ struct FosterMaterial {
                                                        double up) noexcept {
   physics::MoistSurface out = material.moisture;
   if (material.water_slot >= 0) {
-    out.film_frac = physics::face_wet_frac(
-        forcing.wet_frac[static_cast<std::size_t>(material.water_slot)], up);
+    out.film_frac =
+        physics::face_wet_frac(forcing.wet_frac[static_cast<std::size_t>(material.water_slot)], up);
   }
   return out;
 }

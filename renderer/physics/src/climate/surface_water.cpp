@@ -17,7 +17,8 @@ constexpr int kMostParts = 64;
 double dried_mm(const WaterStore& store, double water_mm, double open_mm) noexcept {
   if (store.kind == WaterStore::Kind::film) {
     // S^(1/3) falls at an even rate.
-    const double root = std::cbrt(water_mm) - open_mm / (3.0 * std::pow(store.capacity_mm, kFilmPower));
+    const double root =
+        std::cbrt(water_mm) - open_mm / (3.0 * std::pow(store.capacity_mm, kFilmPower));
     return root > 0.0 ? root * root * root : 0.0;
   }
   // The first stage is straight, the second one exponential.
@@ -54,9 +55,8 @@ StoredWater advance_water(const WaterStore& store, double water_mm, double rain_
     out.water_mm += taken_mm;
     out.drained_mm += mm - taken_mm;
   };
-  const int parts = rain_mm > 0.0
-                        ? std::clamp(static_cast<int>(std::ceil(dt_s / kRainPartS)), 1, kMostParts)
-                        : 1;
+  const int parts =
+      rain_mm > 0.0 ? std::clamp(static_cast<int>(std::ceil(dt_s / kRainPartS)), 1, kMostParts) : 1;
   const double open_mm = open_mm_s * dt_s / parts;
   const double half_mm = 0.5 * rain_mm / parts;
   for (int part = 0; part < parts; ++part) {

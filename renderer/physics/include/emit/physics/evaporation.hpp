@@ -61,8 +61,7 @@ inline constexpr double kOpenStomataWM2 = 100.0;
 [[nodiscard]] constexpr double evaporation_w_m2_pa(double film_w_m2_k, double wetness_frac,
                                                    double resistance_s_m, const MoistAir& air,
                                                    double film_frac = 0.0) noexcept {
-  const double share =
-      wetness_frac / (1.0 + film_w_m2_k * resistance_s_m / air.heat_j_m3_k);
+  const double share = wetness_frac / (1.0 + film_w_m2_k * resistance_s_m / air.heat_j_m3_k);
   return (film_frac + (1.0 - film_frac) * share) * film_w_m2_k / air.psychrometric_pa_k;
 }
 

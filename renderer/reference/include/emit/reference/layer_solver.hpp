@@ -33,7 +33,8 @@ struct FaceMoisture {
   double pressure_pa = 101'325.0;
   double wetness_frac = 1.0;    ///< share of the evaporation of a face that is moist all over
   double resistance_s_m = 0.0;  ///< of the surface, under the light of that instant
-  double film_frac = 0.0;  ///< share that rain has wetted, without that resistance; the rest is as above
+  double film_frac =
+      0.0;  ///< share that rain has wetted, without that resistance; the rest is as above
 
   /// Returns the latent heat that leaves the face, W m-2, without any linearisation: the mass of
   /// water through both resistances times its heat of vaporisation. Dew forms on the whole face,

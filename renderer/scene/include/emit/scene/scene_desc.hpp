@@ -147,7 +147,7 @@ struct Material {
   std::optional<double> surface_resistance_s_m;  ///< in sunlight; absent: 0
   std::optional<double> night_resistance_s_m;    ///< absent: the same as in sunlight
   // foster: rain water (physics.md eq. 61 to 64).
-  std::optional<double> water_store_mm;  ///< what it holds; absent: rain leaves it as it is
+  std::optional<double> water_store_mm;         ///< what it holds; absent: rain leaves it as it is
   std::optional<double> readily_evaporable_mm;  ///< of the top layer of a soil; absent: no soil
   /// Temperature of a hot part or another emitter that takes no part in the thermal simulation.
   std::optional<double> prescribed_k;
@@ -171,7 +171,7 @@ struct Material {
 [[nodiscard]] inline physics::MoistSurface moisture_of(const Material& material) noexcept {
   const bool stated = material.wetness_frac || material.surface_resistance_s_m;
   if (!stated || material.prescribed_k) return {};
-  // What the store holds decides about the wetness of soil.
+  // The store decides about the wetness of soil.
   if (material.water_store_mm && material.readily_evaporable_mm) return {};
   const double resistance_s_m = material.surface_resistance_s_m.value_or(0.0);
   return {.wetness_frac = material.wetness_frac.value_or(1.0),

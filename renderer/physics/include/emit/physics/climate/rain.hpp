@@ -6,9 +6,10 @@
 
 #include "emit/physics/weather.hpp"
 
-/// Rain of weather tables. A row's `rain_mm_h` is the mean rate since the row before, as rain gauges
-/// and typical years have it, so that the depth between two rows is exact whatever steps read it.
-/// There is no rain before the first row and after the last. A single row holds at all times.
+/// Rain of weather tables. A row's `rain_mm_h` is the mean rate since the row before, as rain
+/// gauges and typical years have it, so that the depth between two rows is exact whatever steps
+/// read it. There is no rain before the first row and after the last. A single row holds at all
+/// times.
 namespace emit::physics {
 
 /// Returns the rate at an instant, mm/h. Thread: any. RT-safe.

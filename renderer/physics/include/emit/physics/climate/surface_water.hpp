@@ -46,8 +46,8 @@ struct StoredWater {
 
 /// Cosine of the tilt from which on a face counts as a wall, which rain does not wet.
 inline constexpr double kRainTiltCosine = 0.17;
-/// Returns the wetness of a face whose open level ground has `level_frac`; `up` is the vertical part
-/// of its normal. Walls and undersides stay dry.
+/// Returns the wetness of a face whose open level ground has `level_frac`; `up` is the vertical
+/// part of its normal. Walls and undersides stay dry.
 [[nodiscard]] constexpr double face_wet_frac(double level_frac, double up) noexcept {
   return up > kRainTiltCosine ? level_frac : 0.0;
 }
