@@ -12,6 +12,7 @@
 #include <glm/geometric.hpp>
 
 #include "emit/physics/check.hpp"
+#include "emit/physics/climate/soil_share.hpp"
 #include "emit/physics/step_nodes.hpp"
 #include "emit/threads/parallel.hpp"
 
@@ -358,13 +359,24 @@ void FosterHistory::carry_water(const HistoryInterval& interval, IntervalForcing
       const double t_k = reference_k_ + physics::foster_offset_k(now.modes_k, surface);
       return physics::latent_flux(t_k, physics::lerp(open[0], open[1], f)).flux_w_m2 / j_kg;
     };
+    const auto factor_of = [&](double water_mm) {
+      return physics::warm_soil_factor(ground.store, physics::wet_frac(ground.store, water_mm),
+                                       out.begin.air_k, out.begin.moist);
+    };
+    const auto share_of = [&](double water_mm) {
+      return physics::wet_frac(ground.store, water_mm) * factor_of(water_mm);
+    };
+    // Dew forms on all that is wet.
+    const auto scaled = [](double mm_s, double factor) {
+      return mm_s > 0.0 ? mm_s * factor : mm_s;
+    };
     // Let heat and water take turns over short parts of the interval.
     std::size_t level = 0;
     while (level < kFinestLevel && out.dt_s > kLongestPartS * static_cast<double>(1U << level)) {
       ++level;
     }
     const double parts = static_cast<double>(1U << level);
-    const double begin_frac = physics::wet_frac(ground.store, now.water_mm);
+    const double begin_frac = share_of(now.water_mm);
     double evaporated_mm = 0.0;
     double open_mm = 0.0;
     for (double part = 0.0; part < parts; ++part) {
@@ -372,15 +384,16 @@ void FosterHistory::carry_water(const HistoryInterval& interval, IntervalForcing
       const double to = (part + 1.0) / parts;
       const double dt_s = out.dt_s / parts;
       const double begin_mm_s = open_mm_s(from);
-      const double expected_mm =
-          physics::advance_water(ground.store, now.water_mm, rain_mm / parts, begin_mm_s, dt_s)
-              .water_mm;
-      physics::foster_step(
-          now.modes_k, drive_at(from, physics::wet_frac(ground.store, now.water_mm)),
-          drive_at(to, physics::wet_frac(ground.store, expected_mm)), ladder.level[level], surface);
+      const double begin_factor = factor_of(now.water_mm);
+      const double expected_mm = physics::advance_water(ground.store, now.water_mm, rain_mm / parts,
+                                                        scaled(begin_mm_s, begin_factor), dt_s)
+                                     .water_mm;
+      physics::foster_step(now.modes_k, drive_at(from, share_of(now.water_mm)),
+                           drive_at(to, share_of(expected_mm)), ladder.level[level], surface);
       const double mean_mm_s = 0.5 * (begin_mm_s + open_mm_s(to));
-      const physics::StoredWater after =
-          physics::advance_water(ground.store, now.water_mm, rain_mm / parts, mean_mm_s, dt_s);
+      const double mean_factor = 0.5 * (begin_factor + factor_of(expected_mm));
+      const physics::StoredWater after = physics::advance_water(
+          ground.store, now.water_mm, rain_mm / parts, scaled(mean_mm_s, mean_factor), dt_s);
       now.water_mm = after.water_mm;
       if (mean_mm_s > 0.0) {
         evaporated_mm += after.evaporated_mm;
@@ -388,7 +401,7 @@ void FosterHistory::carry_water(const HistoryInterval& interval, IntervalForcing
       }
     }
     // Give the interval a line whose mean evaporates what has evaporated.
-    const double end_frac = physics::wet_frac(ground.store, now.water_mm);
+    const double end_frac = share_of(now.water_mm);
     const double mean_frac =
         open_mm > 0.0 ? std::min(1.0, evaporated_mm / open_mm) : 0.5 * (begin_frac + end_frac);
     const double most = std::min(mean_frac, 1.0 - mean_frac);

@@ -162,8 +162,7 @@ TEST_F(ConfigTest, epw_every_hour_of_the_year_is_that_of_the_file) {
       return 0.125 * (rows[0].*member + rows[4].*member) +
              0.25 * (rows[1].*member + rows[2].*member + rows[3].*member);
     };
-    beam_off +=
-        std::abs(mean(&scene::WeatherSample::direct_normal_w_m2) - hours[i].beam_w_m2);
+    beam_off += std::abs(mean(&scene::WeatherSample::direct_normal_w_m2) - hours[i].beam_w_m2);
     diffuse_off +=
         std::abs(mean(&scene::WeatherSample::diffuse_horizontal_w_m2) - hours[i].diffuse_w_m2);
     beam_sum += hours[i].beam_w_m2;

@@ -308,6 +308,7 @@ TEST(HostFrameCodec, TakesTheWeatherThatScenariosTakeAndNoOther) {
 
 TEST(HostFrameCodec, WeatherOfOlderHostsStatesNoHumidityWindDirectionOrRain) {
   auto message = valid_message();
+  message.mutable_environment()->Clear();
   message.mutable_environment()->set_air_k(290.0);
   HostFrameDecoder decoder;
   const auto out = std::make_unique<HostFrameData>();

@@ -22,16 +22,37 @@ double wetness(const WaterStore& store, double water_mm) noexcept {
   return (store.capacity_mm - gone_mm) / (store.capacity_mm - store.ready_mm);
 }
 
+/// Resistance of the soil over that of its air film, for which the equation of Penman and Monteith
+/// gives its share of the evaporation of wet soil: (1 + slope/gamma) (1/share - 1).
+double soil_resistance(const WaterStore& store, double share, const ClimateNode& node) noexcept {
+  if (store.kind != WaterStore::Kind::soil) return 0.0;
+  constexpr double kDifferenceK = 0.05;
+  const double slope_pa_k =
+      (saturation_pa(node.air_k + kDifferenceK) - saturation_pa(node.air_k - kDifferenceK)) /
+      (2.0 * kDifferenceK);
+  const double latent_j_kg = 2.501e6 - 2361.0 * (node.air_k - physics::kZeroCelsiusK);
+  const double gamma_pa_k = 1013.0 * node.flow.pressure_pa / (0.622 * latent_j_kg);
+  return (1.0 + slope_pa_k / gamma_pa_k) * (1.0 / share - 1.0);
+}
+
+/// Share of what ground of the same temperature would give that is wet all over.
+double warm_share(const WaterStore& store, double water_mm, const ClimateNode& node) noexcept {
+  const double share = wetness(store, water_mm);
+  if (!(share > 0.0)) return 0.0;
+  return store.kind == WaterStore::Kind::film ? share
+                                              : 1.0 / (1.0 + soil_resistance(store, share, node));
+}
+
 /// Water after a stretch in small steps of second order (Heun's), never below 0 or above the store.
 double later_mm(const WaterStore& store, double water_mm, double rain_mm_s, double begin_mm_s,
-                double end_mm_s, double dt_s) noexcept {
+                double end_mm_s, double dt_s, const ClimateNode& node) noexcept {
   constexpr double kStepS = 1.0;
   const auto steps = static_cast<int>(std::max(1.0, std::ceil(dt_s / kStepS)));
   const double h = dt_s / steps;
   const auto rate = [&](double mm, double frac) {
     const double open_mm_s = begin_mm_s + frac * (end_mm_s - begin_mm_s);
     // Dew forms on what is wet.
-    const double share = open_mm_s > 0.0 ? wetness(store, mm) : (mm > 0.0 ? 1.0 : 0.0);
+    const double share = open_mm_s > 0.0 ? warm_share(store, mm, node) : (mm > 0.0 ? 1.0 : 0.0);
     return rain_mm_s - share * open_mm_s;
   };
   double mm = water_mm;
@@ -77,13 +98,13 @@ WaterCourse water_course(std::span<const ClimateNode> nodes, const scene::Materi
     return face.moisture->latent_w_m2(k, face.air_k, face.film_at_w_m2_k(k)) / latent_j_kg;
   };
   double water_mm = store.initial_mm;
-  const auto keep = [&](std::int64_t time_ns) {
-    out.time_ns.push_back(time_ns);
+  const auto keep = [&](const ClimateNode& node) {
+    out.time_ns.push_back(node.time_ns);
     out.water_mm.push_back(water_mm);
-    out.wet_frac.push_back(wetness(store, water_mm));
+    out.wet_frac.push_back(warm_share(store, water_mm, node));
     out.face_k.push_back(solver.face_k());
   };
-  keep(nodes.front().time_ns);
+  keep(nodes.front());
   for (std::size_t i = 0; i + 1 < nodes.size(); ++i) {
     const ClimateNode& a = nodes[i];
     const ClimateNode& b = nodes[i + 1];
@@ -91,16 +112,17 @@ WaterCourse water_course(std::span<const ClimateNode> nodes, const scene::Materi
     if (dt_s > 0.0) {
       const double rain_mm_s = (b.rain_mm - a.rain_mm) / dt_s;
       const double begin_mm_s = open_mm_s(a);
-      const double expected_mm = later_mm(store, water_mm, rain_mm_s, begin_mm_s, begin_mm_s, dt_s);
+      const double expected_mm =
+          later_mm(store, water_mm, rain_mm_s, begin_mm_s, begin_mm_s, dt_s, a);
       const double end_s = static_cast<double>(b.time_ns - nodes.front().time_ns) * 1e-9;
-      solver.advance({solver.time_s(), end_s, face_at(a, wetness(store, water_mm)),
-                      face_at(b, wetness(store, expected_mm))},
+      solver.advance({solver.time_s(), end_s, face_at(a, warm_share(store, water_mm, a)),
+                      face_at(b, warm_share(store, expected_mm, b))},
                      surface.emissivity_frac);
       const double before_mm = water_mm;
-      water_mm = later_mm(store, water_mm, rain_mm_s, begin_mm_s, open_mm_s(b), dt_s);
+      water_mm = later_mm(store, water_mm, rain_mm_s, begin_mm_s, open_mm_s(b), dt_s, b);
       out.lost_mm += b.rain_mm - a.rain_mm - (water_mm - before_mm);
     }
-    keep(b.time_ns);
+    keep(b);
   }
   return out;
 }

@@ -336,8 +336,13 @@ TEST(FosterHistory, SoilStartsAsWetAsStatedAndDriesWithoutRain) {
   plan.update(3600 * kSecondNs, environment, {});
   history.update(plan, environment);
   const double wet_frac = history.intervals().front().begin.wet_frac[0];
-  EXPECT_LT(wet_frac, 0.55);
-  EXPECT_GT(wet_frac, 0.1);
+  // Of 6 mm some 4 mm evaporate in two days of June: what is left is a share of 0.2, which a
+  // surface as warm gives with a factor of its own.
+  EXPECT_LT(wet_frac, 0.15);
+  EXPECT_GT(wet_frac, 0.02);
+  const double left_mm = history.surroundings().water[0].water_mm;
+  EXPECT_LT(left_mm, 4.5);
+  EXPECT_GT(left_mm, 1.0);
 }
 
 TEST(FosterHistoryContract, ForcingHasOneEntryPerInterval) {

@@ -301,6 +301,50 @@ TEST(ReferenceRain, GroundDriesAsTheReferenceDoes) {
   }
 }
 
+TEST(ReferenceRain, SoilDriesAsFao56Says) {
+  // FAO-56 eq. 74 to 77 with the evaporation of soil that stays wet: day by day, in small steps,
+  // dDe = Kr(De) E_wet.
+  scene::ScenarioDesc scenario = climate_scenario("temperate_summer");
+  scenario.thermal.history_start_ns = -48 * kHourNs;
+  scenario.thermal.spin_up_ns = 0;
+  const auto found = std::ranges::find(scenario.materials, "soil", &scene::Material::name);
+  ASSERT_NE(found, scenario.materials.end());
+  scene::Material soil = *found;
+  soil.wetness_frac = 1.0;
+  scene::Material wet = soil;
+  wet.water_store_mm = 1e4;
+  wet.readily_evaporable_mm = 9e3;
+  reference::ClimateOptions options;
+  options.end_ns = 8 * 24 * kHourNs;
+  const auto climate = reference::SurfaceClimate::create(scenario, options);
+  ASSERT_TRUE(climate.has_value());
+  const auto course = [&](const scene::Material& material) {
+    const auto mesh = reference::material_mesh(material);
+    EXPECT_TRUE(mesh.has_value());
+    return reference::water_course(climate->nodes(), material, scenario.thermal.initial_k,
+                                   climate->surroundings_reflectance_frac(), *mesh);
+  };
+  const reference::WaterCourse dries = course(soil);
+  const reference::WaterCourse stays = course(wet);
+  const double total_mm = *soil.water_store_mm;
+  const double ready_mm = *soil.readily_evaporable_mm;
+  double gone_mm = 0.0;
+  double worst_mm = 0.0;
+  for (std::size_t i = 1; i < dries.time_ns.size(); ++i) {
+    const double open_mm = stays.water_mm[i - 1] - stays.water_mm[i];
+    const double kr = std::clamp((total_mm - gone_mm) / (total_mm - ready_mm), 0.0, 1.0);
+    gone_mm = std::clamp(gone_mm + (open_mm > 0.0 ? kr : 1.0) * open_mm, 0.0, total_mm);
+    worst_mm = std::max(worst_mm, std::abs(total_mm - dries.water_mm[i] - gone_mm));
+    if (dries.time_ns[i] % (24 * kHourNs) == 0) {
+      std::printf("day %2d: %.2f mm gone, FAO-56 %.2f mm, wet soil %.2f mm\n",
+                  static_cast<int>(dries.time_ns[i] / (24 * kHourNs)) + 2,
+                  total_mm - dries.water_mm[i], gone_mm, 1e4 - stays.water_mm[i]);
+    }
+  }
+  EXPECT_GT(gone_mm, 15.0);
+  EXPECT_LT(worst_mm, 0.8);
+}
+
 TEST(ReferenceRain, LongStepsLoseNoWater) {
   // Steps of an hour, as far back in a history, against those of a minute: what fell between two
   // steps counts, and what is left later is the same.

@@ -144,7 +144,7 @@ TEST(RendererCachedWeather, RainActsFromItsInstantOn) {
     most_off_k = std::max(most_off_k, std::abs(is_k - told_ground_k(scenario, told, now_ns)));
   }
   EXPECT_LT(most_off_k, 0.2);
-  EXPECT_GT(open_ground_k(scenario, now_ns) - is_k, 3.0);
+  EXPECT_GT(open_ground_k(scenario, now_ns) - is_k, 1.5);
   EXPECT_FALSE(run.coarse());
 }
 

@@ -15,7 +15,7 @@ namespace emit::reference {
 struct WaterCourse {
   std::vector<std::int64_t> time_ns;
   std::vector<double> water_mm;
-  std::vector<double> wet_frac;  ///< share of the evaporation of ground that is wet all over
+  std::vector<double> wet_frac;  ///< share of what ground as warm and wet all over would give
   std::vector<double> face_k;    ///< temperature of the ground
   double lost_mm = 0.0;          ///< evaporated and drained in all
 
