@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "emit/physics/air_film.hpp"
+#include "emit/physics/evaporation.hpp"
 #include "emit/physics/foster.hpp"
 
 namespace emit::tool {
@@ -159,8 +160,16 @@ class RealTimePlate {
         n.film_factor *
         physics::film_w_m2_k(physics::air_film(reference::air_flow(ground_.setup, row)),
                              {0.0, 0.0, 1.0}, ground_.setup.roughness, before_k - row.air_k);
-    return {n.absorptance_frac * row.sun_w_m2 + n.emissivity_frac * row.longwave_down_w_m2,
-            film_w_m2_k, row.air_k - surface_.reference_k};
+    physics::FosterDrive<double> out{.absorbed_w_m2 = n.absorptance_frac * row.sun_w_m2 +
+                                                      n.emissivity_frac * row.longwave_down_w_m2,
+                                     .film_w_m2_k = film_w_m2_k,
+                                     .air_offset_k = row.air_k - surface_.reference_k};
+    physics::add_moisture(
+        ground_.setup.moisture,
+        physics::moist_air(row.air_k, physics::standard_pressure_pa(ground_.setup.height_m),
+                           row.vapour_pa),
+        row.sun_w_m2, out);
+    return out;
   }
 
   const MeasuredGround& ground_;

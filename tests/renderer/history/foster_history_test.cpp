@@ -336,8 +336,7 @@ TEST(FosterHistory, SoilStartsAsWetAsStatedAndDriesWithoutRain) {
   plan.update(3600 * kSecondNs, environment, {});
   history.update(plan, environment);
   const double wet_frac = history.intervals().front().begin.wet_frac[0];
-  // Of 6 mm some 4 mm evaporate in two days of June: what is left is a share of 0.2, which a
-  // surface as warm gives with a factor of its own.
+  // Some 4 of 6 mm evaporate in two days of June. The wetness that is left counts with eq. 65.
   EXPECT_LT(wet_frac, 0.15);
   EXPECT_GT(wet_frac, 0.02);
   const double left_mm = history.surroundings().water[0].water_mm;
