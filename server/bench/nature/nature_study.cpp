@@ -93,16 +93,21 @@ struct Run {
   std::vector<double> error_k;  ///< model less measurement
 };
 
+/// A record that does not show the numbers keeps them, and `fit_out` has no estimates.
 Result<Run> run_model(const LoggerRecord& record, const MeasuredGround& ground, bool is_fitted,
                       reference::PlateFit* fit_out = nullptr) {
   Run run{ground.numbers, {}, {}};
+  bool shows_numbers = false;
   if (is_fitted) {
     auto fit = reference::fit_plate(ground.setup, record.rows, ground.numbers, kFitted);
-    if (!fit) return tl::unexpected(std::move(fit.error()));
-    run.numbers = fit->numbers;
-    run.model_k = fit->model_k;
-    if (fit_out != nullptr) *fit_out = std::move(*fit);
-  } else {
+    shows_numbers = fit.has_value();
+    if (shows_numbers) {
+      run.numbers = fit->numbers;
+      run.model_k = fit->model_k;
+      if (fit_out != nullptr) *fit_out = std::move(*fit);
+    }
+  }
+  if (!shows_numbers) {
     auto model_k = reference::plate_history_k(ground.setup, record.rows, ground.numbers);
     if (!model_k) return tl::unexpected(std::move(model_k.error()));
     run.model_k = std::move(*model_k);
@@ -283,6 +288,11 @@ Result<NatureDay> study_day(const std::filesystem::path& file, const LoggerOptio
   auto fitted = study_case(day.record, day.ground, true, &day.fit, on_run);
   if (!fitted) return named(fitted.error());
   day.fitted = std::move(*fitted);
+  if (day.fit.estimates.empty()) {
+    day.record.notes.push_back(
+        "inertia and base cannot be fitted: the record does not depend on them. Their figures are "
+        "those of nothing fitted");
+  }
   const auto real_time_k = real_time_history_k(day.record, day.ground);
   if (!real_time_k) return named(real_time_k.error());
   day.real_time = difference_of(day.record, *real_time_k);
