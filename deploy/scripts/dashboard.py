@@ -78,7 +78,7 @@ ROWS = [
          "the scenario asks for.",
          *[(per_minute(f"emitd_{name}_total"), name.removeprefix("frames_").replace("_", " "))
            for name in ("frames_shed", "frames_coarse", "targets_plain", "frames_entities_behind", "frames_warmed_up",
-                        "poses_dropped", "device_failures")]),
+                        "frames_wet_unknown", "poses_dropped", "device_failures")]),
     ]),
     ("Delay", [
         ("Pose to last byte", "timeseries", 8, "s", f"From the arrival of a pose to the last byte of its frame. {BOUND}",

@@ -171,8 +171,15 @@ void to_proto(const EnvironmentData& environment, v1::Environment& out) {
   out.set_cloud_frac(environment.cloud_frac);
   out.clear_environment_k();
   out.clear_film_w_m2_k();
+  out.clear_wind_from_deg();
+  out.clear_relative_humidity_frac();
+  out.set_rain_mm_h(environment.rain_mm_h);
   if (environment.environment_k) out.set_environment_k(*environment.environment_k);
   if (environment.film_w_m2_k) out.set_film_w_m2_k(*environment.film_w_m2_k);
+  if (environment.wind_from_deg) out.set_wind_from_deg(*environment.wind_from_deg);
+  if (environment.relative_humidity_frac) {
+    out.set_relative_humidity_frac(*environment.relative_humidity_frac);
+  }
 }
 
 void to_proto(const PartCommandData& part, v1::PartCommand& out) {
@@ -240,7 +247,13 @@ DecodeStatus check_environment(const EnvironmentData& out, DecodeFault* fault) n
       check.in_range("cloud_frac", out.cloud_frac, limits::kCloudFrac) &&
       (!out.environment_k ||
        check.in_range("environment_k", *out.environment_k, limits::kEnvironmentK)) &&
-      (!out.film_w_m2_k || check.in_range("film_w_m2_k", *out.film_w_m2_k, limits::kFilmWM2K));
+      (!out.film_w_m2_k || check.in_range("film_w_m2_k", *out.film_w_m2_k, limits::kFilmWM2K)) &&
+      (!out.wind_from_deg ||
+       check.in_range("wind_from_deg", *out.wind_from_deg, limits::kWindFromDeg)) &&
+      (!out.relative_humidity_frac ||
+       check.in_range("relative_humidity_frac", *out.relative_humidity_frac,
+                      limits::kHumidityFrac)) &&
+      check.in_range("rain_mm_h", out.rain_mm_h, limits::kRainMmH);
   if (valid) return DecodeStatus::ok;
   set_part(fault, DecodeFault::Part::environment);
   return DecodeStatus::invalid_environment;
@@ -296,6 +309,9 @@ DecodeStatus from_proto(const v1::Environment& in, EnvironmentData& out,
   out.cloud_frac = in.cloud_frac();
   if (in.has_environment_k()) out.environment_k = in.environment_k();
   if (in.has_film_w_m2_k()) out.film_w_m2_k = in.film_w_m2_k();
+  if (in.has_wind_from_deg()) out.wind_from_deg = in.wind_from_deg();
+  if (in.has_relative_humidity_frac()) out.relative_humidity_frac = in.relative_humidity_frac();
+  out.rain_mm_h = in.rain_mm_h();
   return check_environment(out, fault);
 }
 

@@ -40,8 +40,18 @@ EntityAir entity_air(const PoseHistory& entity, const IntervalForcing& forcing,
   };
   const physics::AirFlow begin = flow_past(forcing.begin.flow, begin_ns);
   const physics::AirFlow end = flow_past(forcing.end.flow, end_ns);
-  return {physics::air_film(begin, entity.film_body()), physics::air_film(end, entity.film_body()),
-          physics::felt_air_k(begin), physics::felt_air_k(end)};
+  const auto moist_at = [](const SurfaceForcing& open, const physics::AirFlow& flow) {
+    const double humidity_frac =
+        open.moist.vapour_pa / physics::saturation_over_water_pa(open.flow.air_k);
+    return physics::moist_air(flow.air_k, flow.pressure_pa,
+                              humidity_frac * physics::saturation_over_water_pa(flow.air_k));
+  };
+  return {physics::air_film(begin, entity.film_body()),
+          physics::air_film(end, entity.film_body()),
+          physics::felt_air_k(begin),
+          physics::felt_air_k(end),
+          moist_at(forcing.begin, begin),
+          moist_at(forcing.end, end)};
 }
 
 }  // namespace emit::renderer

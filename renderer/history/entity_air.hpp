@@ -17,6 +17,9 @@ struct EntityAir {
   physics::AirFilm end;
   double begin_air_k = 0.0;  ///< felt_air_k()
   double end_air_k = 0.0;
+  /// Moisture of the air at the height of the entity.
+  physics::MoistAir begin_moist;
+  physics::MoistAir end_moist;
 };
 
 /// Returns shape and length of an entity's flow: the user's, or the longest side of the box around
@@ -26,7 +29,7 @@ struct EntityAir {
                                                     std::size_t object);
 
 /// Returns the air past an entity over an interval of the thermal history: the wind less its own
-/// speed, at its height above the place. RT-safe.
+/// speed, at its height above the place. The relative humidity is that of the ground. RT-safe.
 [[nodiscard]] EntityAir entity_air(const PoseHistory& entity, const IntervalForcing& forcing,
                                    std::int64_t begin_ns, std::int64_t end_ns) noexcept;
 

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "emit/physics/climate/rain.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/physics/weather.hpp"
 #include "emit/scene/scene_desc.hpp"
@@ -41,6 +42,13 @@ class Environment {
   /// Returns the revision, which every change by the host raises.
   [[nodiscard]] std::uint64_t revision() const noexcept { return revision_; }
 
+  /// Returns true if it rains at any instant that is known.
+  [[nodiscard]] bool rains() const noexcept { return !table_rain_.is_dry() || live_rains_; }
+  /// Returns the depth of rain between two instants, mm.
+  [[nodiscard]] double rain_mm(std::int64_t begin_ns, std::int64_t end_ns) const noexcept {
+    return rains() ? rain_until_mm(end_ns) - rain_until_mm(begin_ns) : 0.0;
+  }
+
   /// Returns the position of the sun.
   [[nodiscard]] physics::SunPosition sun_at(std::int64_t sim_time_ns) const noexcept;
   /// Returns the weather. `sun` is the result of sun_at() for the same instant.
@@ -48,6 +56,8 @@ class Environment {
                                             const physics::SunPosition& sun) const noexcept;
 
  private:
+  [[nodiscard]] double rain_until_mm(std::int64_t sim_time_ns) const noexcept;
+
   physics::GeoPlace place_;
   std::int64_t epoch_utc_ns_ = 0;
   physics::ClearSky clear_sky_;
@@ -56,6 +66,9 @@ class Environment {
   double film_factor_ = 1.0;
   std::vector<physics::WeatherSample> live_;
   std::vector<std::int64_t> changes_ns_;  ///< times of the rows of live_
+  physics::RainDepth table_rain_;
+  std::vector<double> live_rain_mm_;  ///< depth at the rows of live_
+  bool live_rains_ = false;
   std::vector<std::uint64_t> revisions_;  ///< revisions of the rows of live_, ascending
   std::uint64_t revision_ = 0;
   std::uint64_t reset_revision_ = 0;

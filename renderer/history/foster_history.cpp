@@ -12,6 +12,7 @@
 #include <glm/geometric.hpp>
 
 #include "emit/physics/check.hpp"
+#include "emit/physics/climate/soil_share.hpp"
 #include "emit/physics/step_nodes.hpp"
 #include "emit/threads/parallel.hpp"
 
@@ -56,15 +57,18 @@ glm::dvec2 octahedral_from_unit(const glm::dvec3& n) noexcept {
   return p;
 }
 
-/// Returns the states of a steady profile between the initial surface temperature and the base.
-FosterState<double> initial_states(const FosterMaterial& material) noexcept {
+/// Returns the states of a steady profile between a surface temperature and the base.
+FosterState<double> initial_states(const FosterMaterial& material, double surface_k) noexcept {
   FosterState<double> x{};
-  const double flux_w_m2 =
-      (material.initial_k - material.base_k) / material.network.resistance_m2k_w();
+  const double flux_w_m2 = (surface_k - material.base_k) / material.network.resistance_m2k_w();
   for (std::size_t i = 0; i < material.network.count; ++i) {
     x[i] = material.network.modes[i].resistance_m2k_w * flux_w_m2;
   }
   return x;
+}
+
+FosterState<double> initial_states(const FosterMaterial& material) noexcept {
+  return initial_states(material, material.initial_k);
 }
 
 physics::FosterSurface<double> surface_of(const FosterMaterial& material,
@@ -125,6 +129,7 @@ HistoryInterval interval_between(std::int64_t begin_ns, std::int64_t end_ns,
   interval.forcing_end =
       environment.forcing_at(end_ns > begin_ns ? end_ns - 1 : end_ns, interval.sun_end);
   fit_changes(interval, environment);
+  interval.rain_mm = environment.rain_mm(begin_ns, end_ns);
   return interval;
 }
 
@@ -156,9 +161,48 @@ FosterDrive<double> unshadowed_drive(const SurfaceForcing& f, const FosterMateri
                             .film_w_m2_k = physics::film_w_m2_k(f.film, normal, material.roughness,
                                                                 reference_k + offset_k - f.air_k),
                             .air_offset_k = f.air_k - reference_k};
-  physics::add_moisture(material.moisture, f.moist, short_wave_w_m2, drive);
+  physics::add_moisture(moisture_at(material, f, normal.z), f.moist, short_wave_w_m2, drive);
   return drive;
 }
+
+namespace {
+
+/// Returns true if rain on open ground of both materials dries alike.
+bool dry_alike(const FosterMaterial& a, const FosterMaterial& b) noexcept {
+  return a.store == b.store && a.moisture == b.moisture && a.roughness == b.roughness &&
+         a.solar_absorptance_frac == b.solar_absorptance_frac &&
+         a.emissivity_frac == b.emissivity_frac && a.base_k == b.base_k &&
+         a.network.resistance_m2k_w() == b.network.resistance_m2k_w();
+}
+
+/// Gives the materials that hold water their slots. Materials beyond the last slot share that of
+/// the store whose capacity is closest by ratio.
+void number_water(std::vector<FosterMaterial>& materials) {
+  std::vector<std::size_t> owners;
+  for (std::size_t m = 0; m < materials.size(); ++m) {
+    FosterMaterial& material = materials[m];
+    if (material.store.none()) continue;
+    const auto same = std::ranges::find_if(
+        owners, [&](std::size_t owner) { return dry_alike(materials[owner], material); });
+    if (same != owners.end()) {
+      material.water_slot = static_cast<int>(same - owners.begin());
+    } else if (owners.size() < physics::kWaterSlots) {
+      material.water_slot = static_cast<int>(owners.size());
+      owners.push_back(m);
+    } else {
+      const auto unlike = [&](std::size_t owner) {
+        const physics::WaterStore& store = materials[owner].store;
+        const bool other_kind = store.kind != material.store.kind;
+        return (other_kind ? 100.0 : 0.0) +
+               std::abs(std::log(store.capacity_mm / material.store.capacity_mm));
+      };
+      material.water_slot =
+          static_cast<int>(std::ranges::min_element(owners, {}, unlike) - owners.begin());
+    }
+  }
+}
+
+}  // namespace
 
 physics::Result<std::vector<FosterMaterial>> foster_materials(
     std::span<const scene::Material> materials, const scene::ThermalOptions& options) {
@@ -169,6 +213,7 @@ physics::Result<std::vector<FosterMaterial>> foster_materials(
     entry.emissivity_frac = material.emissivity_frac;
     entry.roughness = scene::roughness_factor(material.roughness);
     entry.moisture = scene::moisture_of(material);
+    entry.store = scene::water_store_of(material);
     entry.base_k = material.base_k;
     entry.initial_k = material.initial_k.value_or(options.initial_k);
     if (material.prescribed_k) {
@@ -213,6 +258,7 @@ physics::Result<std::vector<FosterMaterial>> foster_materials(
     entry.layers = std::move(layers);
     out.push_back(std::move(entry));
   }
+  number_water(out);
   return out;
 }
 
@@ -234,6 +280,13 @@ FosterHistory::FosterHistory(const scene::ScenarioDesc& scenario,
   }
   nodes_ns_.resize(kSpinUpSteps + 1);
   table_.resize(materials_.size() * grid_nodes_ * grid_nodes_);
+  // Take the first material of each slot for its ground.
+  for (std::size_t m = 0; m <= materials_.size(); ++m) {
+    const FosterMaterial& material = m < materials_.size() ? materials_[m] : surroundings_;
+    if (material.water_slot != static_cast<int>(water_grounds_.size())) continue;
+    water_grounds_.push_back(material);
+    water_surfaces_.push_back(surface_of(material, reference_k));
+  }
   spin_up_gains_.resize(materials_.size());
   spin_up(environment, [](std::size_t rows, const auto& fill) {
     threads::parallel_parts(rows, 1, [&fill](std::size_t begin, std::size_t end) {
@@ -252,23 +305,131 @@ SurfaceForcing FosterHistory::forcing(const physics::SunPosition& sun,
   return out;
 }
 
+void FosterHistory::look_for_water(const Environment& environment) noexcept {
+  has_water_ =
+      environment.rains() || std::ranges::any_of(water_grounds_, [](const FosterMaterial& ground) {
+        return ground.store.initial_mm > 0.0;
+      });
+}
+
+void FosterHistory::carry_water(const HistoryInterval& interval, IntervalForcing& out) noexcept {
+  if (!has_water_) return;
+  constexpr double kLongestPartS = 300.0;
+  constexpr std::size_t kFinestLevel = 3;
+  const glm::dvec3 up(0.0, 0.0, 1.0);
+  const double j_kg = physics::vaporisation_j_kg(out.begin.air_k);
+  for (std::size_t s = 0; s < water_grounds_.size(); ++s) {
+    const FosterMaterial& ground = water_grounds_[s];
+    const physics::FosterSurface<double>& surface = water_surfaces_[s];
+    WaterGround& now = ground_.water[s];
+    if (!now.followed) {
+      // Ground of which nothing was known has the temperature of the surroundings.
+      const double around_k = surroundings_.prescribed()
+                                  ? surroundings_.prescribed_k
+                                  : reference_k_ + physics::foster_offset_k(ground_.surroundings,
+                                                                            surroundings_surface_);
+      now = {initial_states(ground, around_k), 0.0, true};
+    }
+    const double rain_mm = std::max(0.0, interval.rain_mm);
+    const bool wet = rain_mm > 0.0 || now.water_mm > 0.0;
+    // Set up the drive of ground that is as the material states it, and of ground wet all over.
+    const double offset_k = physics::foster_offset_k(now.modes_k, surface);
+    const auto drive = [&](SurfaceForcing f, double wet_frac) {
+      f.wet_frac[s] = wet_frac;
+      return unshadowed_drive(f, ground, up, reference_k_, offset_k);
+    };
+    const auto ladder = physics::foster_ladder(out.dt_s, ground.network);
+    const FosterDrive<double> dry[] = {drive(out.begin, 0.0), drive(out.end, 0.0)};
+    if (!wet) {
+      physics::foster_advance(now.modes_k, dry[0], dry[1], ladder, surface, tolerance_k_);
+      continue;
+    }
+    const FosterDrive<double> open[] = {drive(out.begin, 1.0), drive(out.end, 1.0)};
+    const auto drive_at = [&](double f, double wet_frac) {
+      FosterDrive<double> out_drive = physics::lerp(dry[0], dry[1], f);
+      if (!(wet_frac > 0.0)) return out_drive;
+      const FosterDrive<double> wet_drive = physics::lerp(open[0], open[1], f);
+      out_drive.evaporation_w_m2_pa =
+          std::lerp(out_drive.evaporation_w_m2_pa, wet_drive.evaporation_w_m2_pa, wet_frac);
+      out_drive.dew_w_m2_pa = wet_drive.dew_w_m2_pa;
+      out_drive.vapour_pa = wet_drive.vapour_pa;
+      return out_drive;
+    };
+    const auto open_mm_s = [&](double f) {
+      const double t_k = reference_k_ + physics::foster_offset_k(now.modes_k, surface);
+      return physics::latent_flux(t_k, physics::lerp(open[0], open[1], f)).flux_w_m2 / j_kg;
+    };
+    const auto factor_of = [&](double water_mm) {
+      return physics::warm_soil_factor(ground.store, physics::wet_frac(ground.store, water_mm),
+                                       out.begin.air_k, out.begin.moist);
+    };
+    const auto share_of = [&](double water_mm) {
+      return physics::wet_frac(ground.store, water_mm) * factor_of(water_mm);
+    };
+    // Dew forms on all that is wet.
+    const auto scaled = [](double mm_s, double factor) {
+      return mm_s > 0.0 ? mm_s * factor : mm_s;
+    };
+    // Let heat and water take turns over short parts of the interval.
+    std::size_t level = 0;
+    while (level < kFinestLevel && out.dt_s > kLongestPartS * static_cast<double>(1U << level)) {
+      ++level;
+    }
+    const double parts = static_cast<double>(1U << level);
+    const double begin_frac = share_of(now.water_mm);
+    double evaporated_mm = 0.0;
+    double open_mm = 0.0;
+    for (double part = 0.0; part < parts; ++part) {
+      const double from = part / parts;
+      const double to = (part + 1.0) / parts;
+      const double dt_s = out.dt_s / parts;
+      const double begin_mm_s = open_mm_s(from);
+      const double begin_factor = factor_of(now.water_mm);
+      const double expected_mm = physics::advance_water(ground.store, now.water_mm, rain_mm / parts,
+                                                        scaled(begin_mm_s, begin_factor), dt_s)
+                                     .water_mm;
+      physics::foster_step(now.modes_k, drive_at(from, share_of(now.water_mm)),
+                           drive_at(to, share_of(expected_mm)), ladder.level[level], surface);
+      const double mean_mm_s = 0.5 * (begin_mm_s + open_mm_s(to));
+      const double mean_factor = 0.5 * (begin_factor + factor_of(expected_mm));
+      const physics::StoredWater after = physics::advance_water(
+          ground.store, now.water_mm, rain_mm / parts, scaled(mean_mm_s, mean_factor), dt_s);
+      now.water_mm = after.water_mm;
+      if (mean_mm_s > 0.0) {
+        evaporated_mm += after.evaporated_mm;
+        open_mm += mean_mm_s * dt_s;
+      }
+    }
+    // Give the interval a line whose mean evaporates what has evaporated.
+    const double end_frac = share_of(now.water_mm);
+    const double mean_frac =
+        open_mm > 0.0 ? std::min(1.0, evaporated_mm / open_mm) : 0.5 * (begin_frac + end_frac);
+    const double most = std::min(mean_frac, 1.0 - mean_frac);
+    const double half = std::clamp(0.5 * (end_frac - begin_frac), -most, most);
+    out.begin.wet_frac[s] = mean_frac - half;
+    out.end.wet_frac[s] = mean_frac + half;
+  }
+}
+
 void FosterHistory::carry(const HistoryInterval& interval, double tolerance_k,
                           IntervalForcing& out) noexcept {
   out.begin = forcing(interval.sun_begin, interval.forcing_begin);
   out.end = forcing(interval.sun_end, interval.forcing_end);
   out.dt_s = seconds(interval.begin_ns, interval.end_ns);
+  out.rain_mm = interval.rain_mm;
+  carry_water(interval, out);
   const glm::dvec3 up(0.0, 0.0, 1.0);
   double begin_k = surroundings_.prescribed_k;
   double end_k = surroundings_.prescribed_k;
   if (!surroundings_.prescribed()) {
-    const double offset_k = physics::foster_offset_k(surroundings_state_, surroundings_surface_);
+    const double offset_k = physics::foster_offset_k(ground_.surroundings, surroundings_surface_);
     begin_k = reference_k_ + offset_k;
     const auto ladder = physics::foster_ladder(out.dt_s, surroundings_.network);
-    physics::foster_advance(surroundings_state_,
+    physics::foster_advance(ground_.surroundings,
                             unshadowed_drive(out.begin, surroundings_, up, reference_k_, offset_k),
                             unshadowed_drive(out.end, surroundings_, up, reference_k_, offset_k),
                             ladder, surroundings_surface_, tolerance_k);
-    end_k = reference_k_ + physics::foster_offset_k(surroundings_state_, surroundings_surface_);
+    end_k = reference_k_ + physics::foster_offset_k(ground_.surroundings, surroundings_surface_);
   }
   const auto exitance_w_m2 = [](double t_k) {
     const double t2 = t_k * t_k;
@@ -287,14 +448,21 @@ void FosterHistory::forcing_over(std::span<const std::int64_t> nodes_ns,
                                  std::span<IntervalForcing> out) noexcept {
   EMIT_CHECK_OP(out.size() + 1, ==, nodes_ns.size());
   EMIT_DCHECK(std::ranges::is_sorted(nodes_ns));
-  surroundings_state_ = surroundings_at_start_;
+  look_for_water(environment);
+  ground_ = ground_at_start_;
   for (std::size_t i = 0; i < out.size(); ++i) {
     carry(interval_between(nodes_ns[i], nodes_ns[i + 1], environment), tolerance_k_, out[i]);
   }
 }
 
 void FosterHistory::spin_up_surroundings(const Environment& environment) noexcept {
-  surroundings_state_ =
+  look_for_water(environment);
+  ground_ = {};
+  for (std::size_t s = 0; s < water_grounds_.size() && has_water_; ++s) {
+    ground_.water[s] = {initial_states(water_grounds_[s]), water_grounds_[s].store.initial_mm,
+                        true};
+  }
+  ground_.surroundings =
       surroundings_.prescribed() ? FosterState<double>{} : initial_states(surroundings_);
   const std::int64_t table_ns =
       history_start_ns_ - std::min(spin_up_ns_, tail_.empty() ? 0 : kTailNs);
@@ -313,7 +481,7 @@ void FosterHistory::spin_up_surroundings(const Environment& environment) noexcep
       carry(interval_between(nodes_ns_[i], nodes_ns_[i + 1], environment), tolerance_k_, tail_[i]);
     }
   }
-  surroundings_at_start_ = surroundings_state_;
+  ground_at_start_ = ground_;
 }
 
 FosterState<double> FosterHistory::start_states(std::size_t material,
@@ -336,6 +504,7 @@ FosterState<double> FosterHistory::start_states(std::size_t material,
 IntervalForcing FosterHistory::extend(std::int64_t begin_ns, std::int64_t end_ns,
                                       const Environment& environment) noexcept {
   IntervalForcing out;
+  look_for_water(environment);
   carry(interval_between(begin_ns, end_ns, environment), tolerance_k_, out);
   return out;
 }
@@ -404,7 +573,8 @@ bool FosterHistory::update(const StepPlan& plan, const Environment& environment)
       changed = true;
     }
   }
-  surroundings_state_ = surroundings_at_start_;
+  look_for_water(environment);
+  ground_ = ground_at_start_;
   const auto intervals = plan.intervals();
   for (std::size_t i = 0; i < intervals.size() && i < intervals_.size(); ++i) {
     carry(intervals[i], tolerance_k_, intervals_[i]);

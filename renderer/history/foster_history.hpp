@@ -12,6 +12,7 @@
 #include "emit/renderer/surface_forcing.hpp"
 #include "emit/scene/scene_desc.hpp"
 #include "history/environment.hpp"
+#include "history/ground_state.hpp"
 #include "history/step_plan.hpp"
 
 /// CPU part of the extended thermal model (`thermal.model = "foster"`): the temperature of the
@@ -88,14 +89,10 @@ class FosterHistory {
   [[nodiscard]] IntervalForcing extend(std::int64_t begin_ns, std::int64_t end_ns,
                                        const Environment& environment) noexcept;
 
-  /// Returns the states of the surroundings after the last update() or extend().
-  [[nodiscard]] const physics::FosterState<double>& surroundings() const noexcept {
-    return surroundings_state_;
-  }
-  /// Restores states that surroundings() returned.
-  void restore_surroundings(const physics::FosterState<double>& state) noexcept {
-    surroundings_state_ = state;
-  }
+  /// Returns the state of the surroundings after the last update() or extend().
+  [[nodiscard]] const GroundState& surroundings() const noexcept { return ground_; }
+  /// Restores a state that surroundings() returned.
+  void restore_surroundings(const GroundState& state) noexcept { ground_ = state; }
 
   /// Returns the states of an unshadowed face of materials()[material], with any normal, at the
   /// instant of the table. They come from the full spin-up rather than the table.
@@ -111,6 +108,10 @@ class FosterHistory {
   void spin_up_surroundings(const Environment& environment) noexcept;
   /// Advances the surroundings over one interval and writes its forcing.
   void carry(const HistoryInterval& interval, double tolerance_k, IntervalForcing& out) noexcept;
+  /// Advances the water of the grounds over one interval and writes its wetness.
+  void carry_water(const HistoryInterval& interval, IntervalForcing& out) noexcept;
+  /// Notes whether there is water to follow.
+  void look_for_water(const Environment& environment) noexcept;
   [[nodiscard]] SurfaceForcing forcing(const physics::SunPosition& sun,
                                        const physics::Forcing& weather) const noexcept;
 
@@ -123,8 +124,11 @@ class FosterHistory {
   std::uint32_t grid_nodes_ = 2;
 
   physics::FosterSurface<double> surroundings_surface_;
-  physics::FosterState<double> surroundings_state_{};     ///< current states
-  physics::FosterState<double> surroundings_at_start_{};  ///< states at the history's start
+  GroundState ground_;                         ///< current state
+  GroundState ground_at_start_;                ///< state at the history's start
+  std::vector<FosterMaterial> water_grounds_;  ///< a material of each slot
+  std::vector<physics::FosterSurface<double>> water_surfaces_;
+  bool has_water_ = false;  ///< it rains, or some ground starts moist
   double surroundings_now_k_ = 0.0;
 
   std::vector<IntervalForcing> spin_up_;  ///< intervals up to the instant of the table

@@ -66,6 +66,7 @@ void StepPlan::update(std::int64_t now_ns, const Environment& environment,
                                ? environment.forcing_at(interval.end_ns - 1, sun)
                                : forcing;
 
+    interval.rain_mm = environment.rain_mm(interval.begin_ns, interval.end_ns);
     interval.sample_ns = interval.begin_ns + (interval.end_ns - interval.begin_ns) / 2;
     interval.sun_sample = environment.sun_at(interval.sample_ns);
     if (interval.sun_sample.elevation.value() <= kMinSunElevationRad) {

@@ -21,7 +21,8 @@ struct HistoryInterval {
   physics::SunPosition sun_end;
   physics::Forcing forcing_begin;
   physics::Forcing forcing_end;
-  bool sun_up = false;  ///< true when the sun needs a shadow map
+  double rain_mm = 0.0;  ///< depth that falls in it
+  bool sun_up = false;   ///< true when the sun needs a shadow map
 };
 
 /// Intervals from the history's start to a frame's instant, in order of time. Their number is fixed

@@ -12,7 +12,8 @@
 namespace emit::renderer {
 
 physics::Result<std::vector<IntervalForcing>> surface_forcing(
-    const scene::ScenarioDesc& scenario, std::span<const std::int64_t> nodes_ns) {
+    const scene::ScenarioDesc& scenario, std::span<const std::int64_t> nodes_ns,
+    std::span<const scene::Material> materials) {
   if (nodes_ns.size() < 2 || !std::is_sorted(nodes_ns.begin(), nodes_ns.end())) {
     return physics::make_error(physics::ErrorCode::invalid_argument,
                                "forcing needs at least two instants, in order of time");
@@ -23,10 +24,12 @@ physics::Result<std::vector<IntervalForcing>> surface_forcing(
     scene::ScenarioDesc start = scenario;
     start.thermal.history_start_ns = nodes_ns.front();
     start.thermal.spin_up_ns = 0;
-    // Only the surroundings are simulated, so no other material is needed.
-    auto materials = build_foster_materials(start, {});
-    if (!materials) return tl::unexpected(std::move(materials.error()));
-    FosterHistory history(start, {}, materials->back(), environment, physics::kReferenceK);
+    auto built = build_foster_materials(start, materials);
+    if (!built) return tl::unexpected(std::move(built.error()));
+    const FosterMaterial surroundings = built->back();
+    built->pop_back();
+    FosterHistory history(start, std::move(*built), surroundings, environment,
+                          physics::kReferenceK);
     history.forcing_over(nodes_ns, environment, out);
     return out;
   }

@@ -48,11 +48,11 @@ IntervalForcing SurfaceHistory::extend(std::int64_t begin_ns, std::int64_t end_n
                  : weather_forcing(interval_between(begin_ns, end_ns, environment));
 }
 
-physics::FosterState<double> SurfaceHistory::surroundings() const noexcept {
-  return foster_ ? foster_->surroundings() : physics::FosterState<double>{};
+GroundState SurfaceHistory::surroundings() const noexcept {
+  return foster_ ? foster_->surroundings() : GroundState{};
 }
 
-void SurfaceHistory::restore_surroundings(const physics::FosterState<double>& state) noexcept {
+void SurfaceHistory::restore_surroundings(const GroundState& state) noexcept {
   if (foster_) foster_->restore_surroundings(state);
 }
 

@@ -38,10 +38,10 @@ class SurfaceHistory {
   /// Returns the forcing of an interval that follows the last one.
   [[nodiscard]] IntervalForcing extend(std::int64_t begin_ns, std::int64_t end_ns,
                                        const Environment& environment) noexcept;
-  /// Returns the states of the surroundings after the last update() or extend().
-  [[nodiscard]] physics::FosterState<double> surroundings() const noexcept;
-  /// Restores states that surroundings() returned.
-  void restore_surroundings(const physics::FosterState<double>& state) noexcept;
+  /// Returns the state of the surroundings after the last update() or extend().
+  [[nodiscard]] GroundState surroundings() const noexcept;
+  /// Restores a state that surroundings() returned.
+  void restore_surroundings(const GroundState& state) noexcept;
 
   /// Returns the temperature of the surroundings, K; nothing with emit2014.
   [[nodiscard]] std::optional<double> surroundings_now_k() const noexcept;

@@ -18,6 +18,7 @@
 #include "emit/physics/constants.hpp"
 #include "emit/physics/limits.hpp"
 #include "emit/scene/mesh.hpp"
+#include "emit/scene/rain.hpp"
 #include "emit/scene/sheets.hpp"
 #include "gl/egl_context.hpp"
 #include "history/entity_air.hpp"
@@ -216,6 +217,7 @@ class GlRenderer final : public Renderer {
   gl::EglContext context_;  ///< declared before every member that owns GL objects
   SceneStats scene_stats_;
   SceneHistory history_;
+  std::uint32_t unknown_wet_ = 0;  ///< materials that do not state what rain does to them
   std::vector<std::uint32_t> entity_ids_;
   BandModel bands_;
   std::optional<GasModel> gas_;
@@ -317,6 +319,16 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
       clock_(output.stage_timing) {
   scene_stats_.warnings.insert(scene_stats_.warnings.end(), geometry.warnings.begin(),
                                geometry.warnings.end());
+  const std::vector<std::uint32_t> bare = scene::materials_without_rain(scenario.thermal, geometry);
+  unknown_wet_ = static_cast<std::uint32_t>(bare.size());
+  if (!bare.empty() && history_.environment.rains()) {
+    std::vector<std::string_view> names;
+    for (const std::uint32_t m : bare) names.push_back(geometry.materials[m].name);
+    scene_stats_.warnings.push_back(fmt::format(
+        "{}: it rains, but '{}' state{} no 'water_store_mm' that thermal.model \"foster\" could "
+        "use: rain leaves them dry, and frames within six hours of rain carry 'degraded'",
+        scenario.file.string(), fmt::join(names, "', '"), names.size() == 1 ? "s" : ""));
+  }
   if (!scenario.contacts.empty()) {
     scene_stats_.warnings.push_back(fmt::format(
         "{}: [[contact]] is ignored: no body conducts to another here, only in emit solve in three "
@@ -679,6 +691,12 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
   prepare(request, level);
   view.stats.coarse = stage_->coarse_from(request.sensor_pose) || view.stats.rewarm_s > 0.0 ||
                       is_beyond_sensor(fov_of(request));
+  // Half a millimetre dries within six hours by day; by night it may last longer.
+  constexpr std::int64_t kWetNs = 6 * 3'600'000'000'000;
+  constexpr double kLeastMm = 0.05;
+  const bool rained = history_.environment.rain_mm(request.thermal_time_ns - kWetNs,
+                                                   request.thermal_time_ns) > kLeastMm;
+  view.stats.unknown_wet = rained ? unknown_wet_ : 0;
   view.stats.plain_targets = passes_.targets ? stage_->drawn().lists.plain_targets() : 0;
   bind_frame();
   // Clear the counters, then issue all passes and the read-back.

@@ -218,22 +218,31 @@ void set_foster_forcing(const IntervalForcing& forcing, double reference_k,
   params.air_end_offset_k = static_cast<float>(forcing.end.air_k - reference_k);
 }
 
-void set_foster_gains(double dt_s, std::span<const FosterMaterial> materials,
+void set_foster_gains(const IntervalForcing& forcing, std::span<const FosterMaterial> materials,
                       std::span<gpu::RelaxationParams> params) noexcept {
   static_assert(EMIT_FOSTER_LEVELS == physics::kMaxFosterLevel);
-  EMIT_CHECK_OP(dt_s, >=, 0.0);
-  EMIT_CHECK_OP(params.size(), ==, materials.size() * (EMIT_FOSTER_LEVELS + 1));
+  static_assert(EMIT_RAIN_TILT_COSINE == physics::kRainTiltCosine);
+  EMIT_CHECK_OP(forcing.dt_s, >=, 0.0);
+  EMIT_CHECK_OP(params.size(), ==, materials.size() * EMIT_FOSTER_ENTRIES);
   const auto narrow = [](const physics::FosterState<double>& x) {
     return glm::vec4(static_cast<float>(x[0]), static_cast<float>(x[1]), static_cast<float>(x[2]),
                      static_cast<float>(x[3]));
   };
   for (std::size_t m = 0; m < materials.size(); ++m) {
     // Compute the gains of all splits of one material.
-    const physics::FosterLadder ladder = physics::foster_ladder(dt_s, materials[m].network);
+    const physics::FosterLadder ladder = physics::foster_ladder(forcing.dt_s, materials[m].network);
+    const auto entries = params.subspan(m * EMIT_FOSTER_ENTRIES, EMIT_FOSTER_ENTRIES);
     for (std::size_t level = 0; level < ladder.level.size(); ++level) {
-      params[m * ladder.level.size() + level] = {narrow(ladder.level[level].start_frac),
-                                                 narrow(ladder.level[level].end_frac)};
+      entries[level] = {narrow(ladder.level[level].start_frac),
+                        narrow(ladder.level[level].end_frac)};
     }
+    const int slot = materials[m].water_slot;
+    const auto wet = [slot](const SurfaceForcing& f) {
+      return glm::vec4(
+          slot < 0 ? 0.0F : static_cast<float>(f.wet_frac[static_cast<std::size_t>(slot)]), 0.0F,
+          0.0F, 0.0F);
+    };
+    entries.back() = {wet(forcing.begin), wet(forcing.end)};
   }
 }
 

@@ -39,9 +39,9 @@ namespace emit::renderer {
 /// sun, fluxes, film coefficient and air at both ends of the interval (physics.md eq. 16).
 void set_foster_forcing(const IntervalForcing& forcing, double reference_k,
                         gpu::StepParams& params) noexcept;
-/// Fills the gains of every material over an interval of `dt_s` seconds and over its splits.
-/// @pre dt_s >= 0; `params` has EMIT_FOSTER_LEVELS + 1 entries per material.
-void set_foster_gains(double dt_s, std::span<const FosterMaterial> materials,
+/// Fills the gains of every material over an interval and over its splits, and its wetness.
+/// @pre dt_s >= 0; `params` has EMIT_FOSTER_ENTRIES entries per material.
+void set_foster_gains(const IntervalForcing& forcing, std::span<const FosterMaterial> materials,
                       std::span<gpu::RelaxationParams> params) noexcept;
 
 /// Fills the exact gains of every material over an interval (physics.md eq. 6).

@@ -92,7 +92,7 @@ PerFrameStage::PerFrameStage(const scene::ScenarioDesc& scenario, scene::SceneGe
       passes_(std::move(passes)),
       step_params_(scenario.thermal.steps + 1 + tail_steps_),
       relaxation_params_(materials_.size() * (scenario.thermal.steps + tail_steps_) *
-                         (foster_ ? EMIT_FOSTER_LEVELS + 1 : 1)),
+                         (foster_ ? EMIT_FOSTER_ENTRIES : 1)),
       shadow_commands_(scenario.thermal.steps + 1),
       step_buffer_(gl::Buffer::dynamic(step_params_.size() * sizeof(StepSlot))),
       relaxation_buffer_(
@@ -125,10 +125,10 @@ void PerFrameStage::prepare_foster(bool table_changed) noexcept {
   // Define how one step is filled in: its drive, and gains in the part of the table that `entry`
   // names.
   const auto materials = foster_->materials();
-  const std::size_t stride = materials.size() * (EMIT_FOSTER_LEVELS + 1);
+  const std::size_t stride = materials.size() * EMIT_FOSTER_ENTRIES;
   const auto set = [&](const IntervalForcing& forcing, std::size_t entry, gpu::StepParams& params) {
     set_foster_forcing(forcing, physics::kReferenceK, params);
-    set_foster_gains(forcing.dt_s, materials,
+    set_foster_gains(forcing, materials,
                      std::span(relaxation_params_).subspan(entry * stride, stride));
     params.relaxation_offset = static_cast<std::uint32_t>(entry * stride);
   };

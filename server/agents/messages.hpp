@@ -7,6 +7,7 @@
 #include <span>
 
 #include "agents/frame_source.hpp"
+#include "emit/physics/constants.hpp"
 #include "emit/protocol/control.hpp"
 #include "emit/protocol/frame_header.hpp"
 #include "emit/protocol/host_frame.hpp"
@@ -71,6 +72,25 @@ struct TimedPart {
   std::int64_t sim_time_ns = 0;
   renderer::PartUpdate update;
 };
+/// Returns the renderer's form of a host's weather.
+[[nodiscard]] inline scene::WeatherSample weather_sample(
+    const protocol::EnvironmentData& environment, std::int64_t sim_time_ns) noexcept {
+  scene::WeatherSample out;
+  out.sim_time_ns = sim_time_ns;
+  out.direct_normal_w_m2 = environment.direct_normal_w_m2;
+  out.diffuse_horizontal_w_m2 = environment.diffuse_horizontal_w_m2;
+  out.longwave_down_w_m2 = environment.longwave_down_w_m2;
+  out.air_k = environment.air_k;
+  out.wind_m_s = environment.wind_m_s;
+  out.cloud_frac = environment.cloud_frac;
+  out.environment_k = environment.environment_k;
+  out.film_w_m2_k = environment.film_w_m2_k;
+  if (environment.wind_from_deg) out.wind_from_rad = *environment.wind_from_deg * physics::kDegree;
+  out.relative_humidity_frac = environment.relative_humidity_frac;
+  out.rain_mm_h = environment.rain_mm_h;
+  return out;
+}
+
 /// Returns the renderer's form of a host's command to a part.
 [[nodiscard]] inline TimedPart timed_part(const protocol::PartCommandData& part,
                                           std::int64_t sim_time_ns) noexcept {

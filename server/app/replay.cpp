@@ -92,10 +92,7 @@ physics::Result<std::optional<ReplayedFrame>> JournalPlayer::apply(const v1::Jou
       if (protocol::from_proto(frame.environment(), data) != protocol::DecodeStatus::ok) {
         return fail("environment out of range");
       }
-      weather_.push_back({frame.frame_number(),
-                          {frame.sim_time_ns(), data.direct_normal_w_m2,
-                           data.diffuse_horizontal_w_m2, data.longwave_down_w_m2, data.air_k,
-                           data.wind_m_s, data.cloud_frac, data.environment_k, data.film_w_m2_k}});
+      weather_.push_back({frame.frame_number(), weather_sample(data, frame.sim_time_ns())});
     }
     return std::optional<ReplayedFrame>();
   }

@@ -6,6 +6,9 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "emit/physics/climate/rain.hpp"
+#include "emit/physics/constants.hpp"
+#include "emit/physics/evaporation.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/physics/weather.hpp"
 #include "emit/protocol/convert.hpp"
@@ -26,9 +29,15 @@ bool CigiWeather::take(const cigi::AtmosphereControl& packet) noexcept {
   protocol::EnvironmentData probe;
   probe.air_k = packet.air_temperature_c + physics::kZeroCelsiusK;
   probe.wind_m_s = packet.horizontal_wind_m_s;
+  // Directions from -180 to 360 degrees are allowed.
+  const double from_deg = packet.wind_from_deg;
+  probe.wind_from_deg = from_deg < 0.0 ? from_deg + 360.0 : from_deg;
+  if (packet.humidity_percent > 0) probe.relative_humidity_frac = packet.humidity_percent / 100.0;
   if (protocol::check_environment(probe) != protocol::DecodeStatus::ok) return false;
   air_k_ = probe.air_k;
   wind_m_s_ = probe.wind_m_s;
+  wind_from_deg_ = *probe.wind_from_deg;
+  humidity_frac_ = probe.relative_humidity_frac;
   changed_ = true;
   return true;
 }
@@ -70,8 +79,10 @@ bool CigiWeather::take(const cigi::ComponentControl& packet) noexcept {
 protocol::EnvironmentData CigiWeather::at(std::int64_t sim_time_ns) const noexcept {
   if (stated_) return *stated_;
   physics::Forcing forcing;
+  double rain_mm_h = 0.0;
   if (scenario_ != nullptr && !scenario_->weather.empty()) {
     forcing = physics::forcing_from_rows(scenario_->weather, sim_time_ns);
+    rain_mm_h = physics::rain_rate_mm_h(scenario_->weather, sim_time_ns);
     if (air_k_) {
       forcing.air_k = *air_k_;
       forcing.wind_m_s = wind_m_s_;
@@ -83,6 +94,10 @@ protocol::EnvironmentData CigiWeather::at(std::int64_t sim_time_ns) const noexce
       model.air_mean_k = *air_k_;
       model.air_amplitude_k = 0.0;
       model.wind_m_s = wind_m_s_;
+      if (humidity_frac_) {
+        model.dew_point_k =
+            physics::dew_point_k(*humidity_frac_ * physics::saturation_over_water_pa(*air_k_));
+      }
     }
     if (cloud_frac_) model.cloud_frac = *cloud_frac_;
     const scene::Place at = scenario_ != nullptr ? scenario_->place : scene::Place{};
@@ -100,6 +115,23 @@ protocol::EnvironmentData CigiWeather::at(std::int64_t sim_time_ns) const noexce
   out.wind_m_s = forcing.wind_m_s;
   out.cloud_frac = forcing.cloud_frac;
   if (forcing.environment_stated) out.environment_k = forcing.environment_k;
+  if (air_k_) {
+    out.wind_from_deg = wind_from_deg_;
+  } else if (forcing.wind_to_east != 0.0 || forcing.wind_to_north != 0.0) {
+    const double from_deg =
+        std::atan2(-forcing.wind_to_east, -forcing.wind_to_north) / physics::kDegree;
+    out.wind_from_deg = from_deg < 0.0 ? from_deg + 360.0 : from_deg;
+  }
+  if (humidity_frac_) {
+    out.relative_humidity_frac = humidity_frac_;
+  } else if (const double vapour_pa = forcing.stated_vapour_frac > 0.0
+                                          ? forcing.stated_vapour_pa / forcing.stated_vapour_frac
+                                          : forcing.vapour_pa;
+             vapour_pa > 0.0) {
+    out.relative_humidity_frac =
+        std::min(1.0, vapour_pa / physics::saturation_over_water_pa(out.air_k));
+  }
+  out.rain_mm_h = rain_mm_h;
   return out;
 }
 

@@ -12,9 +12,11 @@ namespace emit::server {
 
 /// Weather of a CIGI host over that of the scenario.
 ///
-/// Air temperature and wind of Atmosphere Control replace the scenario's, and so does the cover of
-/// the cloud layers of Weather Control. A clear-sky model is evaluated with them; of a table of
-/// weather, only these columns change. The Component Control "radiation" states all of it instead.
+/// Air temperature, humidity, wind and its direction of Atmosphere Control replace the scenario's,
+/// and so does the cover of the cloud layers of Weather Control. A humidity of 0 % is one that the
+/// host does not know: the scenario's holds. A clear-sky model is evaluated with them; of a table
+/// of weather, only these columns change. The Component Control "radiation" states all of it
+/// instead.
 ///
 /// Thread: one owner. Real time: RT-safe after construction.
 class CigiWeather {
@@ -50,8 +52,10 @@ class CigiWeather {
 
   const scene::ScenarioDesc* scenario_;
   std::optional<double> air_k_;
-  double wind_m_s_ = 0.0;               ///< comes with `air_k_`
-  std::array<double, 4> cover_frac_{};  ///< of layers 1 to 3
+  double wind_m_s_ = 0.0;                ///< comes with `air_k_`
+  double wind_from_deg_ = 0.0;           ///< comes with `air_k_`
+  std::optional<double> humidity_frac_;  ///< comes with `air_k_`
+  std::array<double, 4> cover_frac_{};   ///< of layers 1 to 3
   std::optional<double> cloud_frac_;
   std::optional<protocol::EnvironmentData> stated_;
   bool changed_ = false;

@@ -23,6 +23,7 @@ namespace emit::server {
   X(clock_steps, "steps of the wall clock of more than 1 ms")                              \
   X(frames_coarse, "frames whose camera stood where the surface was not prepared")         \
   X(targets_plain, "small targets drawn plainly: too many in a frame for windows")         \
+  X(frames_wet_unknown, "frames after rain on materials that state no store of water")     \
   X(frames_warmed_up, "frames in which the surface warmed up again: sim time jumped")      \
   X(frames_entities_behind, "frames with entities of an older one: more than 128 moved")   \
   X(frames_shed, "frames of less than full quality, to be ready in time")                  \

@@ -346,6 +346,19 @@ const std::vector<Case>& cases() {
       {"night_of_open_water",
        material("base_k = 290\nsurface_resistance_s_m = 0\nnight_resistance_s_m = 50\n" + kLayer),
        "s.toml:8:24: 'night_resistance_s_m' has no effect: 'surface_resistance_s_m' is 0"},
+      {"store_of_a_given_temperature", material("prescribed_k = 400\nwater_store_mm = 1\n"),
+       "s.toml:7:18: 'water_store_mm' has no effect: 'prescribed_k' gives the temperature"},
+      {"ready_without_store", material("base_k = 290\nreadily_evaporable_mm = 9\n" + kLayer),
+       "s.toml:7:25: 'readily_evaporable_mm' needs 'water_store_mm'"},
+      {"ready_above_store",
+       material("base_k = 290\nwater_store_mm = 5\nreadily_evaporable_mm = 9\n" + kLayer),
+       "s.toml:8:25: 'readily_evaporable_mm' (9.0) must be below 'water_store_mm' (5.0)"},
+      {"soil_with_stomata",
+       material("base_k = 290\nwater_store_mm = 19\nreadily_evaporable_mm = 9\n"
+                "surface_resistance_s_m = 70\n" +
+                kLayer),
+       "s.toml:9:26: 'surface_resistance_s_m' has no effect: 'readily_evaporable_mm' makes the "
+       "store that of bare soil"},
       {"humidity_above_1",
        "[[weather.sample]]\ntime_s = 5\ndni_w_m2 = 0\ndhi_w_m2 = 0\nlongwave_down_w_m2 = "
        "300\nair_k = 290\nwind_m_s = 0\nrelative_humidity_frac = 55\n",

@@ -209,6 +209,7 @@ foster_fit = { horizon_s = 99000.0, rms_k = 0.125, max_k = 0.75 }
 wetness_frac = 0.625
 surface_resistance_s_m = 90.5
 night_resistance_s_m = 300.25
+water_store_mm = 1.75
 dry_layers_valid = false
 gloss = { wavelength_um = [4.0, 10.0], refractive_index = [1.25, 1.125], extinction_index = [0.0, 0.0625], lobe_frac = 0.75, facet_slope = 0.125 }
 layers = [
@@ -373,6 +374,9 @@ TEST_F(ConfigTest, every_scenario_key_reaches_its_field) {
   EXPECT_EQ(s.materials[2].wetness_frac, 0.625);
   EXPECT_EQ(s.materials[2].surface_resistance_s_m, 90.5);
   EXPECT_EQ(s.materials[2].night_resistance_s_m, 300.25);
+  EXPECT_EQ(s.materials[2].water_store_mm, 1.75);
+  EXPECT_FALSE(s.materials[2].readily_evaporable_mm);
+  EXPECT_EQ(scene::water_store_of(s.materials[2]).kind, physics::WaterStore::Kind::film);
   EXPECT_EQ(scene::moisture_of(s.materials[2]).night_resistance_s_m, 300.25);
   EXPECT_TRUE(scene::moisture_of(s.materials[1]).dry());
   ASSERT_TRUE(s.materials[2].gloss.has_value());

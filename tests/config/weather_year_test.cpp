@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <cstdio>
 #include <fstream>
 #include <iterator>
 #include <numbers>
 #include <sstream>
 
 #include "config/config_support.hpp"
+#include "emit/config/weather_planes.hpp"
+#include "emit/physics/climate/rain.hpp"
 #include "emit/physics/constants.hpp"
 #include "emit/physics/evaporation.hpp"
 #include "emit/physics/sun.hpp"
@@ -42,6 +45,7 @@ struct Hour {
   double longwave_w_m2 = 300.0;
   double beam_w_m2 = 0.0;
   double diffuse_w_m2 = 0.0;
+  double rain_mm = 0.0;
 };
 
 /// A year whose sun comes from 7 h to 17 h, in whole numbers, and whose air warms by the hour.
@@ -70,8 +74,9 @@ std::string epw(const std::vector<Hour>& hours) {
   for (const Hour& h : hours) {
     out += fmt::format(
         "{},{},{},{},0,?9,{},-5,50,85000,0,0,{},0,{},{},0,0,0,0,180,3.5,5,5,20,20000,9,0,10,0,0,88,"
-        "0,0,1\n",
-        h.year, h.month, h.day, h.hour, h.air_c, h.longwave_w_m2, h.beam_w_m2, h.diffuse_w_m2);
+        "0,{},1\n",
+        h.year, h.month, h.day, h.hour, h.air_c, h.longwave_w_m2, h.beam_w_m2, h.diffuse_w_m2,
+        h.rain_mm);
   }
   return out;
 }
@@ -127,6 +132,117 @@ TEST_F(ConfigTest, epw_hours_end_where_they_say_and_keep_their_averages) {
     ASSERT_GE(row.direct_normal_w_m2, 0.0);
     ASSERT_LT(row.direct_normal_w_m2, 1400.0);
   }
+}
+
+TEST_F(ConfigTest, epw_every_hour_of_the_year_is_that_of_the_file) {
+  const auto hours = made_year();
+  write("w.epw", epw(hours));
+  // The epoch is new year, local standard time, of a year without a leap day.
+  const auto loaded = scenario(
+      "epoch_utc = 2023-01-01T07:00:00Z\n[place]\nlat_deg = 40.0\nlon_deg = -105.0\n"
+      "height_m = 1500\n[weather]\nfile = \"w.epw\"\n");
+  ASSERT_TRUE(loaded) << loaded.error().text;
+  const auto first = std::ranges::lower_bound(loaded->weather, std::int64_t{0}, {},
+                                              &scene::WeatherSample::sim_time_ns);
+  ASSERT_EQ(first->sim_time_ns, 0);
+  ASSERT_EQ(hours.size(), 8760U);
+  double beam_off = 0.0;
+  double beam_sum = 0.0;
+  double diffuse_off = 0.0;
+  double diffuse_sum = 0.0;
+  for (std::size_t i = 0; i < hours.size(); ++i) {
+    const auto* rows = &*(first + static_cast<std::ptrdiff_t>(4 * i));
+    // Values of an instant are there at the end of their hour.
+    ASSERT_EQ(rows[4].sim_time_ns, static_cast<std::int64_t>(i + 1) * kHourNs);
+    ASSERT_NEAR(rows[4].air_k, physics::kZeroCelsiusK + hours[i].air_c, 1e-9) << i;
+    ASSERT_NEAR(rows[4].longwave_down_w_m2, 300.0, 1e-9) << i;
+    ASSERT_NEAR(rows[4].wind_m_s, 3.5, 1e-9) << i;
+    ASSERT_NEAR(*rows[4].wind_from_rad, std::numbers::pi, 1e-9) << i;
+    const auto mean = [&](double scene::WeatherSample::*member) {
+      return 0.125 * (rows[0].*member + rows[4].*member) +
+             0.25 * (rows[1].*member + rows[2].*member + rows[3].*member);
+    };
+    beam_off += std::abs(mean(&scene::WeatherSample::direct_normal_w_m2) - hours[i].beam_w_m2);
+    diffuse_off +=
+        std::abs(mean(&scene::WeatherSample::diffuse_horizontal_w_m2) - hours[i].diffuse_w_m2);
+    beam_sum += hours[i].beam_w_m2;
+    diffuse_sum += hours[i].diffuse_w_m2;
+  }
+  EXPECT_LT(beam_off, 1e-3 * beam_sum);
+  EXPECT_LT(diffuse_off, 1e-3 * diffuse_sum);
+}
+
+TEST_F(ConfigTest, epw_rain_falls_in_its_hour) {
+  auto hours = made_year();
+  for (Hour& h : hours) {
+    if (h.month == 6 && h.day == 21 && h.hour == 14) h.rain_mm = 6.0;
+    if (h.month == 6 && h.day == 22 && h.hour == 1) h.rain_mm = 999.0;  // missing
+  }
+  write("w.epw", epw(hours));
+  const auto loaded = scenario(kScenario);
+  ASSERT_TRUE(loaded) << loaded.error().text;
+  const physics::RainDepth depth(loaded->weather);
+  const auto fallen_mm = [&](double from_h, double to_h) {
+    return depth.at_mm(std::llround(to_h * 3.6e12)) - depth.at_mm(std::llround(from_h * 3.6e12));
+  };
+  EXPECT_NEAR(fallen_mm(13.0, 14.0), 6.0, 1e-9);
+  EXPECT_NEAR(fallen_mm(13.0, 13.25), 1.5, 1e-9);
+  EXPECT_NEAR(fallen_mm(0.0, 13.0) + fallen_mm(14.0, 48.0), 0.0, 1e-9);
+  // Older files end before it.
+  std::string text = epw(hours);
+  for (std::size_t at = 0; (at = text.find(",88,0,", at)) != std::string::npos;) {
+    const std::size_t end = text.find('\n', at);
+    text.erase(at, end - at);
+  }
+  write("w.epw", text);
+  const auto old = scenario(kScenario);
+  ASSERT_TRUE(old) << old.error().text;
+  EXPECT_TRUE(physics::RainDepth(old->weather).is_dry());
+}
+
+TEST_F(ConfigTest, planes_see_the_sun_of_a_year) {
+  const auto file = write("w.epw", epw(made_year()));
+  const std::vector<WeatherPlane> planes{
+      {0.0, 0.0}, {180.0, 90.0}, {90.0, 90.0}, {270.0, 90.0}, {0.0, 180.0}};
+  const auto course = weather_on_planes(file, {}, planes, 900.0);
+  ASSERT_TRUE(course) << course.error().text;
+  ASSERT_EQ(course->instants.size(), 365U * 96U + 1U);
+  // Level ground gets all of the diffuse light, walls half of it, a ceiling none.
+  double diffuse_kwh_m2 = 0.0;
+  for (const Hour& h : made_year()) diffuse_kwh_m2 += h.diffuse_w_m2 / 1000.0;
+  EXPECT_NEAR(course->sums[0].sky_kwh_m2, diffuse_kwh_m2, 0.02 * diffuse_kwh_m2);
+  EXPECT_NEAR(course->sums[1].sky_kwh_m2, 0.5 * course->sums[0].sky_kwh_m2, 1e-6);
+  EXPECT_EQ(course->sums[4].beam_kwh_m2, 0.0);
+  EXPECT_NEAR(course->sums[4].sky_kwh_m2, 0.0, 1e-9);
+  for (const PlaneInstant& at : course->instants) {
+    const double hour = std::fmod(at.time_s / 3600.0, 24.0);
+    // The sun is in the east before noon, at this meridian of the zone. No plane has more than it.
+    const bool morning = hour > 8.0 && hour < 11.0;
+    const bool afternoon = hour > 13.0 && hour < 16.0;
+    ASSERT_TRUE(!morning || at.planes[3].beam_w_m2 == 0.0) << at.time_s;
+    ASSERT_TRUE(!afternoon || at.planes[2].beam_w_m2 == 0.0) << at.time_s;
+    for (const PlaneIrradiance& plane : at.planes) {
+      ASSERT_LE(plane.beam_w_m2, at.direct_normal_w_m2 + 1e-9);
+    }
+    ASSERT_NEAR(
+        at.planes[0].beam_w_m2,
+        at.direct_normal_w_m2 * std::max(0.0, std::sin(at.sun_elevation_deg * physics::kDegree)),
+        1e-6);
+  }
+  // A table needs a place.
+  const auto table = write("w.csv",
+                           "time_s,dni_w_m2,dhi_w_m2,longwave_down_w_m2,air_k,wind_m_s\n"
+                           "0,500,50,300,290,3\n3600,500,50,300,290,3\n");
+  const auto refused = weather_on_planes(table, {}, planes, 900.0);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text, HasSubstr("has no place"));
+  WeatherOrigin origin;
+  origin.epoch_utc_ns = 1'718'971'200'000'000'000;  // 21 June 2024, noon, on the equator
+  const auto noon = weather_on_planes(table, origin, planes, 1800.0);
+  ASSERT_TRUE(noon) << noon.error().text;
+  ASSERT_EQ(noon->instants.size(), 3U);
+  EXPECT_NEAR(noon->instants[0].planes[0].beam_w_m2, 500.0 * std::cos(23.44 * physics::kDegree),
+              1.0);
 }
 
 TEST_F(ConfigTest, epw_days_go_on_into_other_years_and_over_leap_days) {
@@ -261,6 +377,7 @@ class WeatherDriver : public ::testing::TestWithParam<const char*> {
         std::filesystem::path(EMIT_TEST_SOURCE_DIR) / "../../shared/nature/ashrae140";
     const auto file = folder / (std::string(GetParam()) + ".epw");
     if (!std::filesystem::exists(file)) GTEST_SKIP() << "no reference data beside the source tree";
+    file_ = file;
     auto year = load_weather_year(file);
     ASSERT_TRUE(year) << year.error().text;
     year_ = std::move(*year);
@@ -295,6 +412,7 @@ class WeatherDriver : public ::testing::TestWithParam<const char*> {
     return std::lerp(value(before), value(before + 1.0), place - before);
   }
 
+  std::filesystem::path file_;
   WeatherYear year_;
   std::string reference_;
   scene::ScenarioDesc scenario_;
@@ -337,6 +455,44 @@ TEST_P(WeatherDriver, PlanesSeeTheSunOfAnotherProgram) {
     }
   }
   EXPECT_EQ(planes, 10);
+}
+
+TEST_P(WeatherDriver, PlanesOfASimulationAreThoseOfAnotherProgram) {
+  // A simulation follows the clear sky within an hour, where the other program has a straight line
+  // between the middles of hours. Means differ less than instants.
+  std::vector<WeatherPlane> planes;
+  std::vector<std::vector<double>> wanted;
+  for (const int azimuth_deg : {0, 90, 180, 270, 315, 45}) {
+    for (const int tilt_deg : {0, 30, 90}) {
+      auto values = reference(fmt::format("azi{:03}til{:02}.H", azimuth_deg, tilt_deg));
+      if (values.empty()) continue;
+      planes.push_back({std::fmod(180.0 + azimuth_deg, 360.0), static_cast<double>(tilt_deg)});
+      wanted.push_back(std::move(values));
+    }
+  }
+  ASSERT_EQ(planes.size(), 10U);
+  const auto course = weather_on_planes(file_, {}, planes, 315'360.0);
+  ASSERT_TRUE(course) << course.error().text;
+  ASSERT_EQ(course->instants.size(), wanted.front().size());
+  for (std::size_t p = 0; p < planes.size(); ++p) {
+    double ours = 0.0;
+    double theirs = 0.0;
+    double squares = 0.0;
+    for (std::size_t i = 0; i < wanted[p].size(); ++i) {
+      const PlaneIrradiance& plane = course->instants[i].planes[p];
+      const double sum = plane.beam_w_m2 + plane.sky_w_m2;
+      ours += sum;
+      theirs += wanted[p][i];
+      squares += std::pow(sum - wanted[p][i], 2.0);
+    }
+    const double count = static_cast<double>(wanted[p].size());
+    const double rms_w_m2 = std::sqrt(squares / count);
+    std::printf("%s azimuth %3.0f tilt %2.0f: mean %6.1f, reference %6.1f W/m2, RMS %5.1f\n",
+                GetParam(), planes[p].azimuth_deg, planes[p].tilt_deg, ours / count, theirs / count,
+                rms_w_m2);
+    EXPECT_NEAR(ours, theirs, 0.04 * theirs) << p;
+    EXPECT_LT(rms_w_m2, 36.0) << p;
+  }
 }
 
 TEST_P(WeatherDriver, EveryHourKeepsWhatTheFileSays) {

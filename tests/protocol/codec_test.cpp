@@ -79,6 +79,9 @@ void expect_equal(const HostFrameData& a, const HostFrameData& b) {
   EXPECT_EQ(a.environment->cloud_frac, b.environment->cloud_frac);
   EXPECT_EQ(a.environment->environment_k, b.environment->environment_k);
   EXPECT_EQ(a.environment->film_w_m2_k, b.environment->film_w_m2_k);
+  EXPECT_EQ(a.environment->wind_from_deg, b.environment->wind_from_deg);
+  EXPECT_EQ(a.environment->relative_humidity_frac, b.environment->relative_humidity_frac);
+  EXPECT_EQ(a.environment->rain_mm_h, b.environment->rain_mm_h);
 }
 
 TEST(HostFrameCodec, RoundTripsBitForBit) {
@@ -286,6 +289,9 @@ TEST(HostFrameCodec, TakesTheWeatherThatScenariosTakeAndNoOther) {
       {[](v1::Environment& e, double v) { e.set_cloud_frac(v); }, 0.0, 1.0},
       {[](v1::Environment& e, double v) { e.set_environment_k(v); }, 100.0, 400.0},
       {[](v1::Environment& e, double v) { e.set_film_w_m2_k(v); }, 0.0, 1000.0},
+      {[](v1::Environment& e, double v) { e.set_wind_from_deg(v); }, 0.0, 360.0},
+      {[](v1::Environment& e, double v) { e.set_relative_humidity_frac(v); }, 0.0, 1.0},
+      {[](v1::Environment& e, double v) { e.set_rain_mm_h(v); }, 0.0, 500.0},
   };
   for (const Range& range : ranges) {
     const auto with_value = [&](double value) {
@@ -298,6 +304,19 @@ TEST(HostFrameCodec, TakesTheWeatherThatScenariosTakeAndNoOther) {
     EXPECT_EQ(with_value(range.lowest - 1e-3), DecodeStatus::invalid_environment) << range.lowest;
     EXPECT_EQ(with_value(range.highest + 1e-3), DecodeStatus::invalid_environment) << range.highest;
   }
+}
+
+TEST(HostFrameCodec, WeatherOfOlderHostsStatesNoHumidityWindDirectionOrRain) {
+  auto message = valid_message();
+  message.mutable_environment()->Clear();
+  message.mutable_environment()->set_air_k(290.0);
+  HostFrameDecoder decoder;
+  const auto out = std::make_unique<HostFrameData>();
+  out->environment.emplace().rain_mm_h = 3.0;  // of the frame before
+  ASSERT_EQ(decode_host_frame(encoded(message), decoder, *out), DecodeStatus::ok);
+  EXPECT_FALSE(out->environment->wind_from_deg);
+  EXPECT_FALSE(out->environment->relative_humidity_frac);
+  EXPECT_EQ(out->environment->rain_mm_h, 0.0);
 }
 
 TEST(HostFrameCodec, CarriesAFieldOfViewAndRefusesWhatIsNone) {

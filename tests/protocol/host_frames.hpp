@@ -41,6 +41,9 @@ inline std::unique_ptr<protocol::HostFrameData> make_host_frame(std::uint32_t en
   environment.wind_m_s = 3.0;
   environment.cloud_frac = 0.25;
   environment.film_w_m2_k = 12.0;
+  environment.wind_from_deg = 215.0;
+  environment.relative_humidity_frac = 0.65;
+  environment.rain_mm_h = 1.5;
   return frame;
 }
 

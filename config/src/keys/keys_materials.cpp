@@ -279,6 +279,14 @@ const KeyTable<Material>& material_keys() {
                        "foster: the same without sunlight, when stomata are closed. Without it "
                        "that in sunlight counts."),
       gloss_key(),
+      number<Material>(
+          "water_store_mm", "mm", above_to(0, 200), EMIT_FIELD(water_store_mm),
+          "foster: rain that the surface holds, 0.5 on asphalt, 2 on grass. Without it "
+          "rain leaves the surface as it is. See Evaporation."),
+      number<Material>("readily_evaporable_mm", "mm", above_to(0, 100),
+                       EMIT_FIELD(readily_evaporable_mm),
+                       "foster: part of the store that evaporates as freely as open water, 2 of "
+                       "sand, 10 of clay. It makes the store that of soil."),
       boolean<Material>("dry_layers_valid", EMIT_FIELD(dry_layers_valid),
                         "`false` says that heat also moves by melting, stirring or other "
                         "evaporation. Temperatures are then a guide only, and a warning says so."),

@@ -102,7 +102,8 @@ const KeyTable<WeatherSample>& weather_sample_keys() {
       number<WeatherSample>("wind_m_s", "m s-1", between(limits::kWindMS), EMIT_FIELD(wind_m_s),
                             "Wind speed. Without it the wind is that of `film_w_m2_k`, which is "
                             "needed then."),
-      number<WeatherSample>("wind_from_deg", "deg", between(0, 360), EMIT_FIELD(wind_from_rad),
+      number<WeatherSample>("wind_from_deg", "deg", between(limits::kWindFromDeg),
+                            EMIT_FIELD(wind_from_rad),
                             "Direction from which the wind blows, clockwise from north. Without it "
                             "faces take the mean over all directions.",
                             kDegree),
@@ -118,10 +119,13 @@ const KeyTable<WeatherSample>& weather_sample_keys() {
           "Convection coefficient of all faces. Without it the air film of physics.md "
           "section 8 gives one for each. "
           "emit2014 does not use it."),
-      number<WeatherSample>("relative_humidity_frac", "", between(0, 1),
+      number<WeatherSample>("relative_humidity_frac", "", between(limits::kHumidityFrac),
                             EMIT_FIELD(relative_humidity_frac),
                             "foster: relative humidity of the air, for materials that evaporate. "
                             "Without it the dew point is that of 60 % at the mean air."),
+      number<WeatherSample>("rain_mm_h", "mm h-1", between(limits::kRainMmH), EMIT_FIELD(rain_mm_h),
+                            "foster: rain since the row before, for materials that hold water. "
+                            "See Evaporation."),
   };
   return keys;
 }

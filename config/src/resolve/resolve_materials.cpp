@@ -57,12 +57,30 @@ void check_bands(const Node& node, const std::vector<std::string>& known_bands,
 /// Reports keys of evaporation that can have no effect, or that contradict each other.
 void check_moisture(const Material& material, const Node& node, Diagnostics& diagnostics) {
   if (material.prescribed_k) {
-    for (const char* key : {"wetness_frac", "surface_resistance_s_m", "night_resistance_s_m"}) {
+    for (const char* key : {"wetness_frac", "surface_resistance_s_m", "night_resistance_s_m",
+                            "water_store_mm", "readily_evaporable_mm"}) {
       if (!node.has(key)) continue;
       diagnostics.add(key_location(node, key),
                       fmt::format("'{}' has no effect: 'prescribed_k' gives the temperature", key));
     }
     return;
+  }
+  if (material.readily_evaporable_mm) {
+    const auto fault = [&](const char* key, const std::string& text) {
+      diagnostics.add(key_location(node, key), text);
+    };
+    if (!material.water_store_mm) {
+      fault("readily_evaporable_mm", "'readily_evaporable_mm' needs 'water_store_mm'");
+    } else if (*material.readily_evaporable_mm >= *material.water_store_mm) {
+      fault("readily_evaporable_mm",
+            fmt::format("'readily_evaporable_mm' ({}) must be below 'water_store_mm' ({})",
+                        toml_number(*material.readily_evaporable_mm),
+                        toml_number(*material.water_store_mm)));
+    } else if (material.surface_resistance_s_m) {
+      fault("surface_resistance_s_m",
+            "'surface_resistance_s_m' has no effect: 'readily_evaporable_mm' makes the store that "
+            "of bare soil");
+    }
   }
   if (!material.night_resistance_s_m) return;
   if (!material.surface_resistance_s_m) {

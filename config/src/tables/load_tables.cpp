@@ -49,8 +49,9 @@ Result<std::vector<scene::WeatherSample>> load_weather_csv(const std::filesystem
                               {"cloud_frac", false, between(limits::kCloudFrac)},
                               {"environment_k", false, between(limits::kEnvironmentK)},
                               {"film_w_m2_k", false, between(limits::kFilmWM2K)},
-                              {"wind_from_deg", false, between(0, 360)},
-                              {"relative_humidity_frac", false, between(0, 1)}});
+                              {"wind_from_deg", false, between(limits::kWindFromDeg)},
+                              {"relative_humidity_frac", false, between(limits::kHumidityFrac)},
+                              {"rain_mm_h", false, between(limits::kRainMmH)}});
   if (!rows) {
     return tl::unexpected<physics::Error>(rows.error());
   }
@@ -67,6 +68,7 @@ Result<std::vector<scene::WeatherSample>> load_weather_csv(const std::filesystem
     sample.film_w_m2_k = row.numbers[8];
     if (row.numbers[9]) sample.wind_from_rad = *row.numbers[9] * physics::kDegree;
     sample.relative_humidity_frac = row.numbers[10];
+    sample.rain_mm_h = row.numbers[11].value_or(0.0);
     if (!row.numbers[5] && !sample.film_w_m2_k) {
       return make_error(
           ErrorCode::config,

@@ -58,6 +58,8 @@ const Field kDiffuse{"diffuse horizontal",
                      0.0,
                      9999.0,
                      physics::limits::kDiffuseHorizontalWM2};
+const Field kRain{"liquid precipitation depth", &YearRecord::rain_mm, 1.0, 0.0, 999.0,
+                  physics::limits::kRainMmH};
 
 /// Lines of a file with their numbers.
 class Lines {
@@ -244,6 +246,11 @@ Result<WeatherYear> read_epw(Lines lines) {
         lines, {static_cast<int>(date[0]), static_cast<int>(date[1]), static_cast<int>(date[2])},
         date[3] - 1.0 + minute / 60.0, record);
     if (read) read = take_all(lines, cells, kColumns, record);
+    // Older files end before the rain.
+    constexpr std::size_t kRainColumn = 33;
+    if (read && cells.size() > kRainColumn) {
+      read = take(lines, cells, kRainColumn, kRain, record);
+    }
     if (!read) return tl::unexpected<Error>(read.error());
     year.records.push_back(record);
   }
@@ -282,10 +289,14 @@ Result<WeatherYear> read_tmy3(Lines lines) {
   lines.next();
   const auto header = lines.cells();
   std::vector<std::pair<std::size_t, const Field*>> columns;
-  // Faces can do without the direction of the wind.
-  const auto direction = std::find(header.begin(), header.end(), "Wdir (degrees)");
-  if (direction != header.end()) {
-    columns.emplace_back(static_cast<std::size_t>(direction - header.begin()), &kDirection);
+  // Faces can do without the direction of the wind, and rain is often not recorded.
+  for (const auto& [name, field] :
+       {std::pair<std::string_view, const Field*>{"Wdir (degrees)", &kDirection},
+        {"Lprecip depth (mm)", &kRain}}) {
+    const auto found = std::find(header.begin(), header.end(), name);
+    if (found != header.end()) {
+      columns.emplace_back(static_cast<std::size_t>(found - header.begin()), field);
+    }
   }
   for (const auto& [name, field] : kColumns) {
     const auto found = std::find(header.begin(), header.end(), name);

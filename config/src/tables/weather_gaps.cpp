@@ -21,7 +21,8 @@ bool same_weather(const WeatherSample& a, const WeatherSample& b) {
          a.longwave_down_w_m2 == b.longwave_down_w_m2 && a.air_k == b.air_k &&
          a.wind_m_s == b.wind_m_s && a.cloud_frac == b.cloud_frac &&
          a.environment_k == b.environment_k && a.film_w_m2_k == b.film_w_m2_k &&
-         a.wind_from_rad == b.wind_from_rad;
+         a.wind_from_rad == b.wind_from_rad &&
+         a.relative_humidity_frac == b.relative_humidity_frac && a.rain_mm_h == b.rain_mm_h;
 }
 
 /// Returns the usual pause around row i: the median of up to five pauses, of which the one before

@@ -262,6 +262,9 @@ void append_rows(const WeatherYear& year, std::span<const Interval> run,
     sample.air_k = mix(&YearRecord::air_k);
     sample.wind_m_s = mix(&YearRecord::wind_m_s);
     sample.wind_from_rad = wind_between(from, to, share);
+    // A row holds the rain since the row before: the first row of a record that of the one before.
+    const YearRecord& fell = share > 0.0 ? to : from;
+    sample.rain_mm_h = row == 0 ? 0.0 : fell.rain_mm.value_or(0.0) / year.record_h;
     if (from.dew_point_k && to.dew_point_k) {
       // A dew point above the air comes from rounding: the air is saturated.
       sample.relative_humidity_frac =

@@ -64,7 +64,8 @@ constexpr YearColumn kYearColumns[] = {
     {"opaque sky cover", "", &YearRecord::cloud_frac},
     {"long-wave down", "W/m2", &YearRecord::longwave_down_w_m2},
     {"direct normal", "W/m2", &YearRecord::direct_normal_w_m2},
-    {"diffuse horizontal", "W/m2", &YearRecord::diffuse_horizontal_w_m2}};
+    {"diffuse horizontal", "W/m2", &YearRecord::diffuse_horizontal_w_m2},
+    {"rain", "mm", &YearRecord::rain_mm}};
 
 std::string text_of(const YearRecord& record) {
   const int minutes = static_cast<int>(std::lround(record.end_h * 60.0));
@@ -247,7 +248,8 @@ constexpr TableColumn kTableColumns[] = {
     {"cloud share", "", &scene::WeatherSample::cloud_frac},
     {"long-wave down", "W/m2", &scene::WeatherSample::longwave_down_w_m2},
     {"direct normal", "W/m2", &scene::WeatherSample::direct_normal_w_m2},
-    {"diffuse horizontal", "W/m2", &scene::WeatherSample::diffuse_horizontal_w_m2}};
+    {"diffuse horizontal", "W/m2", &scene::WeatherSample::diffuse_horizontal_w_m2},
+    {"rain", "mm/h", &scene::WeatherSample::rain_mm_h}};
 
 /// Fills what depends on the height of the sun over a table.
 void check_table_sun(const std::vector<scene::WeatherSample>& rows, const WeatherOrigin& origin,

@@ -31,6 +31,8 @@ struct YearRecord {
   // These are averages over the record.
   std::optional<double> direct_normal_w_m2;
   std::optional<double> diffuse_horizontal_w_m2;
+  /// Depth of liquid water that fell over the record; none: not stated, so that none fell.
+  std::optional<double> rain_mm;
 };
 
 struct WeatherYear {

@@ -48,7 +48,7 @@ std::string header_of(LogTable table) {
     case LogTable::weather:
       return fmt::format(
           "{},direct_normal_w_m2,diffuse_horizontal_w_m2,longwave_down_w_m2,air_k,wind_m_s,"
-          "cloud_frac,environment_k,film_w_m2_k",
+          "cloud_frac,environment_k,film_w_m2_k,wind_from_deg,relative_humidity_frac,rain_mm_h",
           kHostColumns);
     case LogTable::parts:
       return fmt::format("{},entity_id,part_id,temperature_k,power_w_m2,throttle", kHostColumns);
@@ -228,6 +228,10 @@ class Exporter {
     file->number(weather.cloud_frac());
     weather.has_environment_k() ? file->number(weather.environment_k()) : file->empty();
     weather.has_film_w_m2_k() ? file->number(weather.film_w_m2_k()) : file->empty();
+    weather.has_wind_from_deg() ? file->number(weather.wind_from_deg()) : file->empty();
+    weather.has_relative_humidity_frac() ? file->number(weather.relative_humidity_frac())
+                                         : file->empty();
+    file->number(weather.rain_mm_h());
     file->end_row();
   }
 

@@ -2,6 +2,7 @@
 #include "emit/physics/evaporation.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace emit::physics {
 namespace {
@@ -9,8 +10,6 @@ namespace {
 constexpr double kHeatJKgK = 1013.0;    // of moist air, FAO-56
 constexpr double kGasJKgK = 287.05;     // of dry air
 constexpr double kVapourRatio = 0.622;  // molar mass of water over that of dry air
-constexpr double kLatentJKg = 2.501e6;  // at 0 C
-constexpr double kLatentFallJKgK = 2361.0;
 
 }  // namespace
 
@@ -19,8 +18,13 @@ double saturation_over_water_pa(double temperature_k) noexcept {
   return 610.8 * std::exp(17.27 * celsius / (celsius + 237.3));
 }
 
+double dew_point_k(double vapour_pa) noexcept {
+  const double exponent = std::log(vapour_pa / 610.8);
+  return kZeroCelsiusK + 237.3 * exponent / (17.27 - exponent);
+}
+
 MoistAir moist_air(double air_k, double pressure_pa, double vapour_pa) noexcept {
-  const double latent_j_kg = kLatentJKg - kLatentFallJKgK * (air_k - kZeroCelsiusK);
+  const double latent_j_kg = vaporisation_j_kg(air_k);
   return {.vapour_pa = vapour_pa,
           .psychrometric_pa_k = kHeatJKgK * pressure_pa / (kVapourRatio * latent_j_kg),
           .heat_j_m3_k = kHeatJKgK * pressure_pa / (kGasJKgK * air_k)};
@@ -45,12 +49,13 @@ double surface_resistance_s_m(const MoistSurface& surface, double shortwave_w_m2
 
 void add_moisture(const MoistSurface& surface, const MoistAir& air, double shortwave_w_m2,
                   FosterDrive<double>& drive) noexcept {
+  // A face that is dry at one end of a step only has the air's vapour at both.
+  drive.vapour_pa = air.vapour_pa;
   if (surface.dry()) return;
   drive.evaporation_w_m2_pa =
       evaporation_w_m2_pa(drive.film_w_m2_k, surface.wetness_frac,
-                          surface_resistance_s_m(surface, shortwave_w_m2), air);
+                          surface_resistance_s_m(surface, shortwave_w_m2), air, surface.film_frac);
   drive.dew_w_m2_pa = evaporation_w_m2_pa(drive.film_w_m2_k, 1.0, 0.0, air);
-  drive.vapour_pa = air.vapour_pa;
 }
 
 }  // namespace emit::physics

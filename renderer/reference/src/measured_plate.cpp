@@ -13,6 +13,7 @@
 #include "emit/physics/constants.hpp"
 #include "emit/reference/layer_mesh.hpp"
 #include "emit/reference/layer_solver.hpp"
+#include "emit/reference/surface_forcing.hpp"
 
 namespace emit::reference {
 namespace {
@@ -48,7 +49,10 @@ double level_film_w_m2_k(const physics::AirFilm& film, double roughness, double 
 class PlateFace final : public FaceModel {
  public:
   PlateFace(const PlateNumbers& numbers, const PlateSetup& setup)
-      : numbers_(&numbers), roughness_(setup.roughness) {}
+      : numbers_(&numbers),
+        roughness_(setup.roughness),
+        moisture_(setup.moisture),
+        pressure_pa_(physics::standard_pressure_pa(setup.height_m)) {}
   void between(const LoggerRow& a, const physics::AirFilm& a_air, const LoggerRow& b,
                const physics::AirFilm& b_air, double start_s, double end_s) {
     a_ = &a;
@@ -65,12 +69,15 @@ class PlateFace final : public FaceModel {
     constexpr double kSmallK = 0.01;
     const double film_w_m2_k = film_at(f, excess_k);
     const double rise = (film_at(f, excess_k + kSmallK) - film_w_m2_k) / kSmallK;
+    const double latent_w_m2 = latent_at(f, face_k, film_w_m2_k);
+    const double latent_rise =
+        (latent_at(f, face_k + kSmallK, film_at(f, excess_k + kSmallK)) - latent_w_m2) / kSmallK;
     const double black =
         numbers_->emissivity_frac * physics::kStefanBoltzmannWPerM2K4 * face_k * face_k * face_k;
     return {numbers_->absorptance_frac * mix(&LoggerRow::sun_w_m2) +
                 numbers_->emissivity_frac * mix(&LoggerRow::longwave_down_w_m2) - black * face_k -
-                film_w_m2_k * excess_k,
-            -4.0 * black - film_w_m2_k - rise * excess_k};
+                film_w_m2_k * excess_k - latent_w_m2,
+            -4.0 * black - film_w_m2_k - rise * excess_k - latent_rise};
   }
 
  private:
@@ -78,8 +85,20 @@ class PlateFace final : public FaceModel {
     return numbers_->film_factor *
            level_film_w_m2_k(physics::between_films(*a_air_, *b_air_, f), roughness_, excess_k);
   }
+  [[nodiscard]] double latent_at(double f, double face_k, double film_w_m2_k) const noexcept {
+    if (moisture_.dry() || !(film_w_m2_k > 0.0)) return 0.0;
+    const auto mix = [&](double LoggerRow::*m) { return std::lerp(a_->*m, b_->*m, f); };
+    const FaceMoisture face{
+        .vapour_pa = mix(&LoggerRow::vapour_pa),
+        .pressure_pa = pressure_pa_,
+        .wetness_frac = moisture_.wetness_frac,
+        .resistance_s_m = light_resistance_s_m(moisture_, mix(&LoggerRow::sun_w_m2))};
+    return face.latent_w_m2(face_k, mix(&LoggerRow::air_k), film_w_m2_k);
+  }
   const PlateNumbers* numbers_;
   double roughness_;
+  physics::MoistSurface moisture_;
+  double pressure_pa_;
   double start_s_ = 0.0;
   double end_s_ = 1.0;
   const LoggerRow* a_ = nullptr;

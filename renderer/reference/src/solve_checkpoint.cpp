@@ -46,6 +46,7 @@ void add_material(Hash& hash, const scene::Material& m) {
   hash.add(m.name).add(m.solar_absorptance_frac).add(m.emissivity_frac).add(m.base_k);
   hash.add(m.initial_k).add(m.prescribed_k).add(m.sheet).add(m.layers.size()).add(m.roughness);
   hash.add(m.wetness_frac).add(m.surface_resistance_s_m).add(m.night_resistance_s_m);
+  hash.add(m.water_store_mm).add(m.readily_evaporable_mm);
   for (const scene::Layer& l : m.layers) {
     hash.add(l.thickness_m)
         .add(l.conductivity_w_m_k)
@@ -114,7 +115,7 @@ SolveFingerprint fingerprint(const scene::ScenarioDesc& scenario,
     weather.add(w.sim_time_ns).add(w.direct_normal_w_m2).add(w.diffuse_horizontal_w_m2);
     weather.add(w.longwave_down_w_m2).add(w.air_k).add(w.wind_m_s).add(w.cloud_frac);
     weather.add(w.environment_k).add(w.film_w_m2_k).add(w.wind_from_rad);
-    weather.add(w.relative_humidity_frac);
+    weather.add(w.relative_humidity_frac).add(w.rain_mm_h);
   }
   print.weather = weather.value();
   // Hash the materials of the scene and of the surroundings.

@@ -53,7 +53,8 @@ void add_latent(const ClimateNode& now, const physics::MoistSurface& moisture,
   const FaceMoisture face{.vapour_pa = now.vapour_pa,
                           .pressure_pa = now.flow.pressure_pa,
                           .wetness_frac = moisture.wetness_frac,
-                          .resistance_s_m = light_resistance_s_m(moisture, shortwave_w_m2)};
+                          .resistance_s_m = light_resistance_s_m(moisture, shortwave_w_m2),
+                          .film_frac = moisture.film_frac};
   constexpr double kDifferenceK = 0.01;
   const auto latent_w_m2 = [&](double k) { return face.latent_w_m2(k, now.air_k, film_w_m2_k); };
   const double slope_w_m2_k =
@@ -134,17 +135,26 @@ ExchangeSky exchange_sky(const ClimateNode& now, double surroundings_reflectance
 SolidRadiation::SolidRadiation(const VoxelModel& model, const SolidSolver& solver,
                                const scene::SceneGeometry& geometry, const SceneInstant& instant,
                                const SurfaceClimate& climate, const SolveOptions& options,
-                               bool exchanges)
+                               const scene::ThermalOptions& thermal)
     : model_(model),
       instant_(instant),
       climate_(climate),
-      exchanges_(exchanges),
+      exchanges_(thermal.exchange),
       finder_(model.grid(), solver.faces(), model.thickest_sheet_m()) {
   const auto faces = solver.faces();
   for (const SolidFace& face : faces) {
     surfaces_.push_back(surface_of(model, face, geometry));
     face_material_.push_back(model.face(face).material);
     moisture_.push_back(scene::moisture_of(geometry.materials[face_material_.back()]));
+  }
+  for (const scene::Material& material : geometry.materials) {
+    water_.emplace_back();
+    if (scene::water_store_of(material).none()) continue;
+    if (const auto mesh = material_mesh(material)) {
+      water_.back() =
+          water_course(climate.nodes(), material, material.initial_k.value_or(thermal.initial_k),
+                       climate.surroundings_reflectance_frac(), *mesh);
+    }
   }
   exchange_ = std::make_unique<SceneExchange>(faces, surfaces_, finder_, instant, options.rays);
   sun_ = std::make_unique<SunOnFaces>(faces, surfaces_);
@@ -181,14 +191,20 @@ void SolidRadiation::drive(double time_s, std::span<const double> face_k, const 
   }
   // Set the drive of every face, with the film at its temperature now.
   const physics::AirFilm film = physics::air_film(now.flow);
+  wet_frac_.resize(water_.size());
+  for (std::size_t m = 0; m < water_.size(); ++m) wet_frac_[m] = water_[m].at(ns(time_s));
   const double cavity4 = std::pow(model_.cavity_k(), 4);
   for (std::size_t f = 0; f < n; ++f) {
     const ExchangeFace& s = surfaces_[f];
     out.film_w_m2_k[f] =
         s.enclosed ? 0.0 : physics::film_w_m2_k(film, s.normal, s.roughness, face_k[f] - now.air_k);
     out.air_k[f] = now.air_k;
-    if (!s.enclosed && !moisture_[f].dry()) {
-      add_latent(now, moisture_[f], direct_w_m2_[f] + incoming_[f].shortwave_w_m2, face_k[f],
+    physics::MoistSurface moisture = moisture_[f];
+    // Rain wets what does not stand upright.
+    constexpr double kSteepestUp = 0.17;
+    if (s.normal.z > kSteepestUp) moisture.film_frac = wet_frac_[face_material_[f]];
+    if (!s.enclosed && !moisture.dry()) {
+      add_latent(now, moisture, direct_w_m2_[f] + incoming_[f].shortwave_w_m2, face_k[f],
                  out.film_w_m2_k[f], out.air_k[f]);
     }
     out.absorbed_w_m2[f] =
@@ -241,7 +257,7 @@ Result<std::unique_ptr<SolidHistory>> SolidHistory::create(const scene::Scenario
   if (!solver) return tl::unexpected(std::move(solver.error()));
   history->solver_ = std::make_unique<SolidSolver>(std::move(*solver));
   history->radiation_ = std::make_unique<SolidRadiation>(
-      voxel, *history->solver_, geometry, instant, climate, options, scenario.thermal.exchange);
+      voxel, *history->solver_, geometry, instant, climate, options, scenario.thermal);
   return history;
 }
 
@@ -273,7 +289,7 @@ Result<void> SolidHistory::spin_up() {
       coarse->grid(), [&](const SolidFace& face) { return coarse->condition(face); }, solid);
   if (!solver) return tl::unexpected(std::move(solver.error()));
   SolidRadiation radiation(*coarse, *solver, geometry_, instant_, climate_, options_,
-                           scenario_.thermal.exchange);
+                           scenario_.thermal);
   // Advance from the steady profile to the start of the history.
   solver->set_temperature(start_s, steady);
   const auto reached = solver->advance(

@@ -10,6 +10,7 @@
 #include "emit/reference/solid_solver.hpp"
 #include "emit/reference/solve.hpp"
 #include "emit/reference/surface_forcing.hpp"
+#include "emit/reference/surface_water.hpp"
 #include "emit/reference/visibility.hpp"
 #include "emit/reference/voxel_model.hpp"
 
@@ -22,7 +23,8 @@ class SolidRadiation {
   /// Traces the views of all faces. The arguments must outlive the object.
   SolidRadiation(const VoxelModel& model, const SolidSolver& solver,
                  const scene::SceneGeometry& geometry, const SceneInstant& instant,
-                 const SurfaceClimate& climate, const SolveOptions& options, bool exchanges);
+                 const SurfaceClimate& climate, const SolveOptions& options,
+                 const scene::ThermalOptions& thermal);
 
   /// Fills the drive of every face at a time, for SolidSolver::advance().
   void drive(double time_s, std::span<const double> face_k, const FaceDrive& out);
@@ -53,12 +55,14 @@ class SolidRadiation {
   std::vector<ExchangeFace> surfaces_;
   std::vector<std::uint32_t> face_material_;
   std::vector<physics::MoistSurface> moisture_;  ///< by face
+  std::vector<WaterCourse> water_;               ///< by material
   FaceFinder finder_;
   std::unique_ptr<SceneExchange> exchange_;
   std::unique_ptr<SunOnFaces> sun_;
   std::vector<double> sun_frac_, direct_w_m2_;
   std::vector<Incoming> incoming_;
-  double left_w_m2_ = 0.0;  ///< greatest result of SceneExchange::incoming()
+  std::vector<double> wet_frac_;  ///< of level ground, by material
+  double left_w_m2_ = 0.0;        ///< greatest result of SceneExchange::incoming()
 };
 
 /// History of a voxel model under a scenario's forcing. It has a spin-up on a coarse grid, then one

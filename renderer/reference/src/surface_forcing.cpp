@@ -8,9 +8,11 @@
 #include <glm/geometric.hpp>
 #include <string>
 
+#include "emit/physics/climate/rain.hpp"
 #include "emit/physics/constants.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/physics/weather.hpp"
+#include "emit/reference/surface_water.hpp"
 #include "emit/scene/base.hpp"
 
 namespace emit::reference {
@@ -28,6 +30,7 @@ struct Weather {
   std::int64_t epoch_utc_ns = 0;
   physics::ClearSky clear_sky;
   std::vector<physics::WeatherSample> rows;
+  physics::RainDepth rain;
   double usual_dew_point_k = 0.0;
   double film_factor = 1.0;
 
@@ -37,6 +40,7 @@ struct Weather {
         epoch_utc_ns(scenario.epoch_utc_ns),
         clear_sky(scenario.clear_sky),
         rows(scenario.weather),
+        rain(scenario.weather),
         usual_dew_point_k(scene::usual_dew_point_k(scenario)),
         film_factor(scenario.thermal.film_factor) {}
 
@@ -62,6 +66,7 @@ struct Weather {
     node.air_k = forcing.air_k;
     node.flow = physics::air_flow(forcing);
     node.surroundings_k = forcing.environment_k;
+    node.rain_mm = rain.at_mm(time_ns);
     node.vapour_pa = physics::with_vapour(forcing, usual_dew_point_k).vapour_pa;
     stated = forcing.environment_stated;
     return node;
@@ -119,12 +124,20 @@ FaceState face_state(const ClimateNode& climate, const SurfaceOptics& surface,
                 0.0, climate.air_k,
                 FaceFilm{physics::air_film(climate.flow), surface.normal, surface.roughness,
                          surface.both_sides}};
-  if (!surface.moisture.dry()) {
+  if (!surface.moisture.dry() || surface.holds_water) {
     out.moisture =
         FaceMoisture{.vapour_pa = climate.vapour_pa,
                      .pressure_pa = climate.flow.pressure_pa,
                      .wetness_frac = surface.moisture.wetness_frac,
                      .resistance_s_m = light_resistance_s_m(surface.moisture, shortwave)};
+    // Rain wets what does not stand upright.
+    constexpr double kSteepestUp = 0.17;
+    const double up = surface.normal.z;
+    if (surface.both_sides) {
+      out.moisture->film_frac = std::abs(up) > kSteepestUp ? 0.5 * climate.wet_frac : 0.0;
+    } else if (up > kSteepestUp) {
+      out.moisture->film_frac = climate.wet_frac;
+    }
   }
   return out;
 }
@@ -176,7 +189,9 @@ ClimateNode SurfaceClimate::at(std::int64_t time_ns) const noexcept {
           mix(a.air_k, b.air_k),
           physics::between_flows(a.flow, b.flow, f),
           mix(a.surroundings_k, b.surroundings_k),
-          mix(a.vapour_pa, b.vapour_pa)};
+          mix(a.vapour_pa, b.vapour_pa),
+          mix(a.rain_mm, b.rain_mm),
+          mix(a.wet_frac, b.wet_frac)};
 }
 
 Result<SurfaceClimate> SurfaceClimate::create(const scene::ScenarioDesc& scenario,
@@ -230,7 +245,14 @@ Result<SurfaceClimate> SurfaceClimate::create(const scene::ScenarioDesc& scenari
       ground->prescribed_k ? Result<LayerMesh>(LayerMesh()) : material_mesh(*ground, options.mesh);
   if (!mesh) return tl::unexpected(std::move(mesh.error()));
   std::vector<double> ground_k(climate.nodes_.size(), ground->prescribed_k.value_or(0.0));
-  if (!ground->prescribed_k) {
+  const double initial_k = ground->initial_k.value_or(scenario.thermal.initial_k);
+  const WaterCourse water = ground->prescribed_k
+                                ? WaterCourse{}
+                                : water_course(climate.nodes_, *ground, initial_k,
+                                               climate.reflectance_frac_, *mesh, options.steps);
+  if (!water.empty()) {
+    ground_k = water.face_k;
+  } else if (!ground->prescribed_k) {
     const SurfaceOptics surface{{0.0, 0.0, 1.0},
                                 ground->solar_absorptance_frac,
                                 ground->emissivity_frac,
@@ -245,9 +267,7 @@ Result<SurfaceClimate> SurfaceClimate::create(const scene::ScenarioDesc& scenari
                                                  climate.reflectance_frac_)});
     }
     LayerSolver solver(*mesh, options.steps);
-    const auto profile =
-        steady_profile(solid_layers(ground->layers),
-                       ground->initial_k.value_or(scenario.thermal.initial_k), ground->base_k);
+    const auto profile = steady_profile(solid_layers(ground->layers), initial_k, ground->base_k);
     face_history(solver, profile, rows, surface.emissivity_frac, times_s, ground_k);
   }
   for (std::size_t i = 0; i < climate.nodes_.size(); ++i) {

@@ -136,12 +136,16 @@ Result<std::vector<std::size_t>> MaterialLookup::resolve(std::uint32_t object_in
 void MaterialLookup::warn_of_moisture() {
   std::vector<std::string_view> moist;
   std::vector<std::string_view> wet;  // without a resistance: soil or water
+  const bool rains = std::ranges::any_of(
+      scenario_->weather, [](const physics::WeatherSample& row) { return row.rain_mm_h > 0.0; });
   for (std::size_t i = 0; i < library_.size(); ++i) {
     const physics::MoistSurface moisture = moisture_of(library_[i]);
+    const physics::WaterStore store = water_store_of(library_[i]);
+    const bool gets_wet = !store.none() && (rains || store.initial_mm > 0.0);
     const bool around = library_[i].name == scenario_->thermal.surroundings_material;
-    if (moisture.dry() || !(used_[i] || around)) continue;
+    if ((moisture.dry() && !gets_wet) || !(used_[i] || around)) continue;
     moist.push_back(library_[i].name);
-    if (moisture.resistance_s_m == 0.0 && library_[i].dry_layers_valid) {
+    if (!moisture.dry() && moisture.resistance_s_m == 0.0 && library_[i].dry_layers_valid) {
       wet.push_back(library_[i].name);
     }
   }
@@ -159,7 +163,7 @@ void MaterialLookup::warn_of_moisture() {
   if (!wet.empty()) {
     warnings_.push_back(
         fmt::format("{}: '{}' stay{} as wet as stated over the whole run: drying "
-                    "is not modelled",
+                    "needs 'readily_evaporable_mm'",
                     scenario_->file.string(), fmt::join(wet, "', '"), wet.size() == 1 ? "s" : ""));
   }
   // The history is what matters, from its start to a day of frames.

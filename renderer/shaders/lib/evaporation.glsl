@@ -23,9 +23,10 @@ vec2 latent_flux(float t, vec3 moist) {
 }
 
 // Exchange of water under a film and a short-wave irradiance, as latent_flux() takes it. `water` holds the wetness
-// (0: dry) and the resistances in sunlight and without it in s/m.
-vec3 moist_drive(vec3 water, MoistAirParams air, float film_w_m2_k, float shortwave_w_m2) {
-  if (!(water.x > 0.0)) return vec3(0.0);
+// and the resistances in sunlight and without it in s/m, `wet_frac` is the share that rain has wetted. Without both
+// the surface is dry, and has the vapour of the air alone.
+vec3 moist_drive(vec3 water, float wet_frac, MoistAirParams air, float film_w_m2_k, float shortwave_w_m2) {
+  if (!(water.x > 0.0 || wet_frac > 0.0)) return vec3(0.0, 0.0, air.vapour_pa);
   float resistance_s_m = water.y;
   float light_frac = clamp(shortwave_w_m2 / air.stomata_w_m2, 0.0, 1.0);
   if (resistance_s_m > 0.0 && light_frac < 1.0) {
@@ -33,7 +34,8 @@ vec3 moist_drive(vec3 water, MoistAirParams air, float film_w_m2_k, float shortw
     resistance_s_m = 1.0 / mix(night_m_s, 1.0 / resistance_s_m, light_frac);
   }
   float dew = film_w_m2_k / air.psychrometric_pa_k;
-  return vec3(water.x * dew / (1.0 + film_w_m2_k * resistance_s_m / air.heat_j_m3_k), dew, air.vapour_pa);
+  float share = water.x / (1.0 + film_w_m2_k * resistance_s_m / air.heat_j_m3_k);
+  return vec3(mix(share, 1.0, wet_frac) * dew, dew, air.vapour_pa);
 }
 
 #endif

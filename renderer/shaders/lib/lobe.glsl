@@ -59,7 +59,7 @@ float lobe_unmasked_both(float from, float to) {
 }
 
 // Light of the sun that facets reflect to the viewer, per irradiance and per reflectance of the facets, sr-1 (physics.md
-// eq. 64). `across2` is the squared sine between the half-way direction and the normal.
+// eq. 74). `across2` is the squared sine between the half-way direction and the normal.
 float lobe_glint_per_sr(float slope2, bool gaussian, float view_cosine, float facet_cosine, float across2,
                         float open) {
   // Spread the facets by the sun's disc, and show no more than the disc itself.

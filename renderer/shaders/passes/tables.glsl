@@ -26,3 +26,10 @@ vec4 foster_start_frac(int entry) { return texelFetch(relaxation_table, entry * 
 
 // Gains of the four modes of foster for the flux at the end of a step.
 vec4 foster_end_frac(int entry) { return texelFetch(relaxation_table, entry * 2 + 1); }
+
+// foster: share of a face that rain has wetted, at the start and the end of an interval. Walls and undersides stay dry.
+vec2 rain_wet_frac(int entry, float up) {
+  if (!(up > EMIT_RAIN_TILT_COSINE)) return vec2(0.0);
+  int at = (entry + EMIT_FOSTER_ENTRIES - 1) * 2;
+  return vec2(texelFetch(relaxation_table, at).x, texelFetch(relaxation_table, at + 1).x);
+}

@@ -95,9 +95,13 @@ void main() {
                                    step_params.environment_end_w_m2, sky_frac,
                                    film_w_m2_k(step_params.film_end, n, roughness, excess_k),
                                    step_params.air_end_offset_k);
+  int entry = int(step_params.relaxation_offset) + material * EMIT_FOSTER_ENTRIES;
   vec3 water = material_water(material);
-  begin.moist = moist_drive(water, step_params.moist_start, begin.dry.y, short_begin + sun_frac * max(sun_begin, 0.0));
-  end.moist = moist_drive(water, step_params.moist_end, end.dry.y, short_end + sun_frac * max(sun_end, 0.0));
+  vec2 wet_frac = rain_wet_frac(entry, n.z);
+  begin.moist = moist_drive(water, wet_frac.x, step_params.moist_start, begin.dry.y,
+                            short_begin + sun_frac * max(sun_begin, 0.0));
+  end.moist = moist_drive(water, wet_frac.y, step_params.moist_end, end.dry.y,
+                          short_end + sun_frac * max(sun_end, 0.0));
   float absorbed_frac = surface.x * sun_frac;
   FosterDrive lit_begin = begin;
   lit_begin.dry.x += absorbed_frac * max(sun_begin, 0.0);
@@ -106,7 +110,6 @@ void main() {
 
   // Advance over the whole interval in one step.
   bool clamped = false;
-  int entry = int(step_params.relaxation_offset) + material * (EMIT_FOSTER_LEVELS + 1);
   vec4 x = foster_step(x0, lit_begin, lit_end, foster_start_frac(entry), foster_end_frac(entry), s, clamped);
   // Double the number of steps until neither a state nor the temperature changes by more than the tolerance.
   for (int level = 1; level <= EMIT_FOSTER_LEVELS; ++level) {

@@ -146,7 +146,8 @@ struct StepParams {
 // emit2014: the exact step of one material over one interval (lib/relaxation.glsl). A texel belongs to a mode and holds
 // the gain of the drive at the start, the gain at the end, the weight of the mode, 0.
 // foster: one entry per split of the interval (lib/foster.glsl). `first` holds the gains of the four modes for the flux
-// at the start, `second` those for the flux at the end.
+// at the start, `second` those for the flux at the end. One entry follows them: `first` and `second` hold the share of
+// open, level ground that rain has wetted, at the start and the end of the interval, and zeros.
 struct RelaxationParams {
   vec4 first;
   vec4 second;

@@ -109,11 +109,18 @@ FosterHeat::FilmSpan FosterHeat::film_over(const SampleAdvance& each,
   FilmSpan out;
   out.begin.air_k = air != nullptr ? air->begin_air_k : forcing.begin.air_k;
   out.end.air_k = air != nullptr ? air->end_air_k : forcing.end.air_k;
-  out.begin.moist = forcing.begin.moist;
-  out.end.moist = forcing.end.moist;
+  out.begin.moist = air != nullptr ? air->begin_moist : forcing.begin.moist;
+  out.end.moist = air != nullptr ? air->end_moist : forcing.end.moist;
   const double excess_k = reference_k_ + offset_k(sample.material, *each.state) - out.begin.air_k;
   const double roughness = materials_[sample.material].roughness;
+  const int slot = materials_[sample.material].water_slot;
   const auto add_face = [&](const glm::dvec3& normal, double share_frac) {
+    if (slot >= 0) {
+      const auto s = static_cast<std::size_t>(slot);
+      out.begin.wet_frac +=
+          share_frac * physics::face_wet_frac(forcing.begin.wet_frac[s], normal.z);
+      out.end.wet_frac += share_frac * physics::face_wet_frac(forcing.end.wet_frac[s], normal.z);
+    }
     const double natural = physics::natural_film_w_m2_k(begin, normal.z, excess_k);
     out.begin.film_w_m2_k +=
         share_frac * physics::joined_film_w_m2_k(
@@ -142,7 +149,9 @@ FosterDrive<double> FosterHeat::absorbed(std::uint32_t material, const FilmDrive
                        materials_[material].emissivity_frac * in.longwave_w_m2 + part.power_w_m2,
       .film_w_m2_k = film.film_w_m2_k,
       .air_offset_k = film.air_k - reference_k_};
-  physics::add_moisture(materials_[material].moisture, film.moist, in.shortwave_w_m2, drive);
+  physics::MoistSurface moisture = materials_[material].moisture;
+  moisture.film_frac = film.wet_frac;
+  physics::add_moisture(moisture, film.moist, in.shortwave_w_m2, drive);
   if (part.contact_w_m2_k > 0.0) {
     // Join film and contact to one conductance, to the mean temperature of their far ends.
     const double film_w_m2 = drive.film_w_m2_k * drive.air_offset_k;

@@ -142,6 +142,7 @@ class FosterHeat {
     double film_w_m2_k = 0.0;
     double air_k = 0.0;
     physics::MoistAir moist;
+    double wet_frac = 0.0;  ///< share that rain has wetted
   };
   /// Film and air at both ends of an interval.
   struct FilmSpan {

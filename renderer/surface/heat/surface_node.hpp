@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "emit/renderer/surface_forcing.hpp"
+#include "history/ground_state.hpp"
 #include "surface/heat/surface_samples.hpp"
 
 namespace emit::renderer {
@@ -81,7 +82,7 @@ struct SurfaceNode {
   std::int64_t at_ns = 0;
   /// Forcing of the interval that ends at this node, as it was assumed when the node was computed.
   IntervalForcing forcing;
-  physics::FosterState<double> surroundings{};  ///< state of the surroundings
+  GroundState surroundings;    ///< state of the surroundings
   std::vector<double> body_k;  ///< interiors of the bodies, from the reference temperature
   std::optional<double> surroundings_k;  ///< set if the thermal model computes their temperature
 };
@@ -96,6 +97,18 @@ template <class T>
                                                           double frac) noexcept {
   physics::FosterState<double> out;
   for (std::size_t i = 0; i < a.size(); ++i) out[i] = between(a[i], b[i], frac);
+  return out;
+}
+[[nodiscard]] inline GroundState between(const GroundState& a, const GroundState& b,
+                                         double frac) noexcept {
+  GroundState out = b;
+  out.surroundings = between(a.surroundings, b.surroundings, frac);
+  for (std::size_t s = 0; s < out.water.size(); ++s) {
+    // Ground that is followed from some instant on has no state before.
+    if (!a.water[s].followed) continue;
+    out.water[s].modes_k = between(a.water[s].modes_k, b.water[s].modes_k, frac);
+    out.water[s].water_mm = between(a.water[s].water_mm, b.water[s].water_mm, frac);
+  }
   return out;
 }
 [[nodiscard]] inline physics::CellState<float> between(const physics::CellState<float>& a,

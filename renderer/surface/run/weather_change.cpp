@@ -34,12 +34,23 @@ bool weather_matters(const SurfaceNode& node, std::int64_t now_ns, const Environ
   const auto off = [&](double SurfaceForcing::*value) {
     return std::abs(is.*value - between(taken.begin.*value, taken.end.*value, way));
   };
-  // Compare the film of a level face that much above the air.
-  const auto film_w_m2_k = [](const SurfaceForcing& forcing) {
-    return physics::film_w_m2_k(forcing.film, glm::dvec3(0.0, 0.0, 1.0), kRoughness, kFilmK);
+  // Compare the films of a level face and of walls that much above the air: a wind that turns
+  // changes those of walls alone.
+  const auto film_of = [](const SurfaceForcing& forcing, const glm::dvec3& normal) {
+    return physics::film_w_m2_k(forcing.film, normal, kRoughness, kFilmK);
   };
-  const double film_change_w_m2_k =
-      std::abs(film_w_m2_k(is) - between(film_w_m2_k(taken.begin), film_w_m2_k(taken.end), way));
+  const auto film_w_m2_k = [&](const SurfaceForcing& forcing) {
+    return film_of(forcing, {0.0, 0.0, 1.0});
+  };
+  double film_change_w_m2_k = 0.0;
+  for (const glm::dvec3& normal :
+       {glm::dvec3(0.0, 0.0, 1.0), glm::dvec3(1.0, 0.0, 0.0), glm::dvec3(-1.0, 0.0, 0.0),
+        glm::dvec3(0.0, 1.0, 0.0), glm::dvec3(0.0, -1.0, 0.0)}) {
+    film_change_w_m2_k =
+        std::max(film_change_w_m2_k,
+                 std::abs(film_of(is, normal) -
+                          between(film_of(taken.begin, normal), film_of(taken.end, normal), way)));
+  }
   // Bound the change of the flux into a surface by the sum of the changes of all its parts.
   double change_w_m2 =
       glm::distance(is.sun_w_m2, glm::mix(taken.begin.sun_w_m2, taken.end.sun_w_m2, way)) +
@@ -52,7 +63,11 @@ bool weather_matters(const SurfaceNode& node, std::int64_t now_ns, const Environ
     change_w_m2 += std::abs(physics::environment_input_w_m2(1.0, weather.environment_k) -
                             between(taken.begin.environment_w_m2, taken.end.environment_w_m2, way));
   }
-  return change_w_m2 > kMinChangeWM2K * tolerance_k;
+  // Water matters by the heat that takes it away: 0.01 mm are 24 kJ/m2.
+  constexpr double kRainMm = 0.01;
+  const std::int64_t begin_ns = node.at_ns - std::llround(1e9 * taken.dt_s);
+  const double rain_change_mm = std::abs(environment.rain_mm(begin_ns, node.at_ns) - taken.rain_mm);
+  return change_w_m2 > kMinChangeWM2K * tolerance_k || rain_change_mm > kRainMm;
 }
 
 }  // namespace emit::renderer

@@ -27,6 +27,7 @@ void add_weather(Fnv64& hash, const physics::WeatherSample& row) {
   add_optional(hash, row.film_w_m2_k);
   add_optional(hash, row.wind_from_rad);
   add_optional(hash, row.relative_humidity_frac);
+  add(hash, row.rain_mm_h);
 }
 
 void add_pose(Fnv64& hash, const physics::Pose& pose) {
@@ -97,6 +98,8 @@ void add_material(Fnv64& hash, const scene::Material& material) {
     add(hash, material.clutter->solar_absorptance_sd_frac, material.clutter->emissivity_sd_frac,
         material.clutter->inertia_sd_ln);
   }
+  const physics::WaterStore store = scene::water_store_of(material);
+  add(hash, store.kind, store.capacity_mm, store.ready_mm, store.initial_mm);
 }
 
 std::uint64_t materials_hash(const scene::ScenarioDesc& scenario,

@@ -140,15 +140,7 @@ void Conductor::store_weather(const protocol::EnvironmentData& environment,
     --weather_count_;
     context_.counters.add(Counter::weather_coalesced);
   }
-  weather_[weather_count_++] = {sim_time_ns,
-                                environment.direct_normal_w_m2,
-                                environment.diffuse_horizontal_w_m2,
-                                environment.longwave_down_w_m2,
-                                environment.air_k,
-                                environment.wind_m_s,
-                                environment.cloud_frac,
-                                environment.environment_k,
-                                environment.film_w_m2_k};
+  weather_[weather_count_++] = weather_sample(environment, sim_time_ns);
 }
 
 void Conductor::drop_unknown_entities(HostInput& input) noexcept {

@@ -301,13 +301,14 @@ void RenderAgent::finish_shot(InFlight& frame, std::size_t camera, RenderDone& d
   image.readback_end_ns = done.readback_end_ns;
   image.nonfinite_px = view.stats.nonfinite_px;
   image.clamped_px = view.stats.clamped_px;
-  image.coarse = view.stats.coarse || view.stats.plain_targets > 0;
+  image.coarse = view.stats.coarse || view.stats.plain_targets > 0 || view.stats.unknown_wet > 0;
   done.nonfinite_px += view.stats.nonfinite_px;
   done.clamped_px += view.stats.clamped_px;
   done.dropped_poses = view.stats.dropped_poses;
   note_dropped_poses(view.stats.dropped_poses);
   done.coarse = done.coarse || image.coarse;
   if (view.stats.coarse) context_.counters.add(Counter::frames_coarse);
+  if (view.stats.unknown_wet > 0) context_.counters.add(Counter::frames_wet_unknown);
   context_.counters.add(Counter::targets_plain, view.stats.plain_targets);
   // The level of the image that lost most stands for the frame.
   if (view.quality_level >= done.quality_level) {

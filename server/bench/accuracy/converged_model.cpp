@@ -67,7 +67,8 @@ physics::FosterDrive<double> drive(const SurfaceForcing& f, const PointView& vie
       .film_w_m2_k = physics::film_w_m2_k(f.film, view.normal, material.roughness,
                                           physics::kReferenceK + offset_k - f.air_k),
       .air_offset_k = f.air_k - physics::kReferenceK};
-  physics::add_moisture(material.moisture, f.moist, short_wave_w_m2, out);
+  physics::add_moisture(renderer::moisture_at(material, f, view.normal.z), f.moist, short_wave_w_m2,
+                        out);
   return out;
 }
 
@@ -88,7 +89,7 @@ Result<ConvergedModel> ConvergedModel::create(const scene::ScenarioDesc& scenari
   }
   out.history_ = all_ns.size();
   all_ns.insert(all_ns.end(), nodes_ns.begin(), nodes_ns.end());
-  auto forcing = renderer::surface_forcing(scenario, all_ns);
+  auto forcing = renderer::surface_forcing(scenario, all_ns, materials);
   if (!forcing) return tl::unexpected(std::move(forcing.error()));
   out.forcing_ = std::move(*forcing);
   if (foster) {

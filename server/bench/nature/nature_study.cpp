@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "emit/physics/air_film.hpp"
+#include "emit/physics/evaporation.hpp"
 #include "emit/physics/foster.hpp"
 
 namespace emit::tool {
@@ -92,16 +93,21 @@ struct Run {
   std::vector<double> error_k;  ///< model less measurement
 };
 
+/// A record that does not show the numbers keeps them, and `fit_out` has no estimates.
 Result<Run> run_model(const LoggerRecord& record, const MeasuredGround& ground, bool is_fitted,
                       reference::PlateFit* fit_out = nullptr) {
   Run run{ground.numbers, {}, {}};
+  bool shows_numbers = false;
   if (is_fitted) {
     auto fit = reference::fit_plate(ground.setup, record.rows, ground.numbers, kFitted);
-    if (!fit) return tl::unexpected(std::move(fit.error()));
-    run.numbers = fit->numbers;
-    run.model_k = fit->model_k;
-    if (fit_out != nullptr) *fit_out = std::move(*fit);
-  } else {
+    shows_numbers = fit.has_value();
+    if (shows_numbers) {
+      run.numbers = fit->numbers;
+      run.model_k = fit->model_k;
+      if (fit_out != nullptr) *fit_out = std::move(*fit);
+    }
+  }
+  if (!shows_numbers) {
     auto model_k = reference::plate_history_k(ground.setup, record.rows, ground.numbers);
     if (!model_k) return tl::unexpected(std::move(model_k.error()));
     run.model_k = std::move(*model_k);
@@ -159,8 +165,16 @@ class RealTimePlate {
         n.film_factor *
         physics::film_w_m2_k(physics::air_film(reference::air_flow(ground_.setup, row)),
                              {0.0, 0.0, 1.0}, ground_.setup.roughness, before_k - row.air_k);
-    return {n.absorptance_frac * row.sun_w_m2 + n.emissivity_frac * row.longwave_down_w_m2,
-            film_w_m2_k, row.air_k - surface_.reference_k};
+    physics::FosterDrive<double> out{.absorbed_w_m2 = n.absorptance_frac * row.sun_w_m2 +
+                                                      n.emissivity_frac * row.longwave_down_w_m2,
+                                     .film_w_m2_k = film_w_m2_k,
+                                     .air_offset_k = row.air_k - surface_.reference_k};
+    physics::add_moisture(
+        ground_.setup.moisture,
+        physics::moist_air(row.air_k, physics::standard_pressure_pa(ground_.setup.height_m),
+                           row.vapour_pa),
+        row.sun_w_m2, out);
+    return out;
   }
 
   const MeasuredGround& ground_;
@@ -274,6 +288,11 @@ Result<NatureDay> study_day(const std::filesystem::path& file, const LoggerOptio
   auto fitted = study_case(day.record, day.ground, true, &day.fit, on_run);
   if (!fitted) return named(fitted.error());
   day.fitted = std::move(*fitted);
+  if (day.fit.estimates.empty()) {
+    day.record.notes.push_back(
+        "inertia and base cannot be fitted: the record does not depend on them. Their figures are "
+        "those of nothing fitted");
+  }
   const auto real_time_k = real_time_history_k(day.record, day.ground);
   if (!real_time_k) return named(real_time_k.error());
   day.real_time = difference_of(day.record, *real_time_k);

@@ -331,6 +331,11 @@ void Rendering::print_warnings(const renderer::FrameView& view) const {
                     "per pixel",
                     frame, view.stats.plain_targets));
   }
+  if (view.stats.unknown_wet > 0) {
+    warn(
+        fmt::format("{}{} materials are shown dry after rain, because they state no store of water",
+                    frame, view.stats.unknown_wet));
+  }
 }
 
 Json Rendering::run_json() const {
@@ -352,6 +357,7 @@ Json Rendering::frame_json(double time_s, std::size_t band, const renderer::Fram
   json.set("nonfinite_px", view.stats.nonfinite_px);
   json.set("clamped_px", view.stats.clamped_px);
   json.set("plain_targets", view.stats.plain_targets);
+  json.set("unknown_wet", view.stats.unknown_wet);
   json.set("radiance", plane_json(view.radiance_w_m2_sr[band]));
   if (!view.temperature_k.empty()) {
     const auto sky =

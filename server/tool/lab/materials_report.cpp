@@ -67,7 +67,9 @@ std::string with_spread(double value, double half) {
 /// Wetness and resistances in s/m of a moist material.
 std::string evaporation_text(const Material& material) {
   const physics::MoistSurface water = scene::moisture_of(material);
-  if (water.dry()) return "-";
+  const physics::WaterStore store = scene::water_store_of(material);
+  const std::string rain = store.none() ? "" : fmt::format("{:.3g} mm of rain", store.capacity_mm);
+  if (water.dry()) return rain.empty() ? "-" : rain;
   std::string text = fmt::format("{:.3g} of full", water.wetness_frac);
   if (water.resistance_s_m > 0.0) {
     text += fmt::format(", {:.0f} s/m", water.resistance_s_m);
@@ -75,7 +77,7 @@ std::string evaporation_text(const Material& material) {
       text += fmt::format(", night {:.0f}", water.night_resistance_s_m);
     }
   }
-  return text;
+  return rain.empty() ? text : text + ", " + rain;
 }
 
 std::string share_text(double half) {

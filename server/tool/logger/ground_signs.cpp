@@ -73,7 +73,15 @@ void add_signs_of_words(const LoggerRecord& record, const MeasuredGround& ground
   const std::string_view plant =
       stated_word(record.words, {"grass", "lawn", "pasture", "meadow", "crop", "crops", "canopy",
                                  "forest", "corn", "soybeans", "wheat", "vegetation"});
-  if (!plant.empty()) {
+  const bool evaporates = !ground.setup.moisture.dry();
+  if (!plant.empty() && evaporates) {
+    signs.push_back({"vegetation",
+                     fmt::format("the file speaks of '{}': plants evaporate as material '{}' "
+                                 "states, which is not measured, and their leaves are not layers "
+                                 "of soil",
+                                 plant, ground.material.name),
+                     false});
+  } else if (!plant.empty()) {
     signs.push_back({"vegetation",
                      fmt::format("the file speaks of '{}': plants evaporate, and their leaves are "
                                  "not layers of soil",
@@ -84,7 +92,11 @@ void add_signs_of_words(const LoggerRecord& record, const MeasuredGround& ground
   if (!wet.empty()) {
     signs.push_back(
         {"wet",
-         fmt::format("the file speaks of '{}': wet ground evaporates, dry layers do not", wet)});
+         evaporates
+             ? fmt::format("the file speaks of '{}': how wet the ground is, is not measured", wet)
+             : fmt::format("the file speaks of '{}': wet ground evaporates, dry layers do not",
+                           wet),
+         !evaporates});
   }
   const std::string_view snow = stated_word(record.words, {"snow", "snowy", "ice", "glacier"});
   if (!snow.empty()) {
@@ -92,14 +104,16 @@ void add_signs_of_words(const LoggerRecord& record, const MeasuredGround& ground
                                          "which dry layers do not",
                                          snow)});
   }
-  // The ground of a record is computed as dry layers.
-  if (ground.material.dry_layers_valid && scene::moisture_of(ground.material).dry()) return;
+  // Moist ground is computed as dry layers where the humidity of the air is not known.
+  const bool holds = evaporates || scene::moisture_of(ground.material).dry();
+  if (ground.material.dry_layers_valid && holds) return;
   signs.push_back(
       {"material", fmt::format("material '{}' is not valid as dry layers", ground.material.name)});
 }
 
-void add_signs_of_moisture(const LoggerRecord& record, const DayHeat& heat,
-                           std::vector<GroundSign>& signs) {
+void add_signs_of_moisture(const LoggerRecord& record, const MeasuredGround& ground,
+                           const DayHeat& heat, std::vector<GroundSign>& signs) {
+  const bool breaks = ground.setup.moisture.dry();
   double latent_w_m2 = 0.0;
   double hours = 0.0;
   for (std::size_t i = 0; i < record.latent_w_m2.size(); ++i) {
@@ -109,8 +123,10 @@ void add_signs_of_moisture(const LoggerRecord& record, const DayHeat& heat,
   }
   constexpr double kMuchWM2 = 20.0;
   if (hours > 0.0 && latent_w_m2 / hours > kMuchWM2) {
-    signs.push_back({"evaporation", fmt::format("evaporation takes {:.0f} W/m2 by day, measured",
-                                                latent_w_m2 / hours)});
+    signs.push_back(
+        {"evaporation",
+         fmt::format("evaporation takes {:.0f} W/m2 by day, measured", latent_w_m2 / hours),
+         breaks});
   } else if (heat.hours > 0.0 && heat.least_missing_w_m2 > kMuchWM2 &&
              heat.least_missing_w_m2 > 0.1 * heat.net_radiation_w_m2) {
     signs.push_back(
@@ -120,7 +136,8 @@ void add_signs_of_moisture(const LoggerRecord& record, const DayHeat& heat,
                      "inertia 40 % greater: evaporation is likely, "
                      "unless the ground is another one",
                      heat.missing_w_m2, heat.net_radiation_w_m2, heat.to_air_w_m2,
-                     heat.to_ground_w_m2, heat.least_missing_w_m2)});
+                     heat.to_ground_w_m2, heat.least_missing_w_m2),
+         breaks});
   }
   if (record.rh_frac.empty()) return;
   const double wet_h =
@@ -191,7 +208,7 @@ std::vector<GroundSign> ground_signs(const LoggerRecord& record, const MeasuredG
     signs.push_back({"snow", fmt::format("the ground reflects {:.2f} of the sun: snow, ice or salt",
                                          *record.reflected_frac)});
   }
-  add_signs_of_moisture(record, heat, signs);
+  add_signs_of_moisture(record, ground, heat, signs);
   const auto [coldest, warmest] = std::ranges::minmax_element(
       record.rows, {}, [](const LoggerRow& row) { return row.surface_k; });
   if (coldest->surface_k < kFreezingK - 1.0 && warmest->surface_k > kFreezingK + 1.0) {

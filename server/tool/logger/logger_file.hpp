@@ -23,8 +23,8 @@
 /// | | long-wave from the sky | `longwave_down_w_m2` | yes | | surface | `longwave_up_w_m2`,
 /// `surface_k`, `surface_c` | yes | | air | `air_k`, `air_c` | yes | | wind, 10 m up | `wind_m_s` |
 /// this or `film_w_m2_k` | | film of the air | `film_w_m2_k` | no | | relative humidity | `rh_pct`
-/// | no: for signs of dew | | heat that evaporation takes | `latent_w_m2` | no: for signs of
-/// moisture |
+/// | no: for moist materials and signs of dew | | heat that evaporation takes | `latent_w_m2` | no:
+/// for signs of moisture |
 ///
 /// An empty cell, `nan` and codes at or below -999 mean that the value is missing; rows without a
 /// needed value are left out and counted. Direct and diffuse sun win over global sun, whose

@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "emit/config/load.hpp"
+#include "emit/physics/evaporation.hpp"
 #include "emit/physics/nearest_name.hpp"
 #include "emit/scene/base.hpp"
 
@@ -67,6 +69,29 @@ std::pair<double, std::string> base_of(const GroundOptions& options, const Logge
           is_ground ? "annual wave of the ground by latitude, height and date" : "mean of the air"};
 }
 
+/// Gives moist ground its exchange of water, if the record has the humidity of the air. A missing
+/// value takes the one before, or the first one.
+void set_moisture(LoggerRecord& record, MeasuredGround& ground) {
+  const physics::MoistSurface moisture = scene::moisture_of(ground.material);
+  if (moisture.dry()) return;
+  const auto first =
+      std::ranges::find_if(record.rh_frac, [](double rh) { return !std::isnan(rh); });
+  if (first == record.rh_frac.end()) {
+    ground.origins.push_back("evaporation: none, because the record has no humidity (rh_pct)");
+    return;
+  }
+  double rh_frac = *first;
+  for (std::size_t i = 0; i < record.rows.size(); ++i) {
+    if (!std::isnan(record.rh_frac[i])) rh_frac = std::min(1.0, record.rh_frac[i]);
+    record.rows[i].vapour_pa = rh_frac * physics::saturation_over_water_pa(record.rows[i].air_k);
+  }
+  ground.setup.moisture = moisture;
+  ground.origins.push_back(
+      fmt::format("evaporation: humidity of the record, wetness {:g} and resistance {:g} s/m of "
+                  "material '{}'",
+                  moisture.wetness_frac, moisture.resistance_s_m, ground.material.name));
+}
+
 }  // namespace
 
 Result<MeasuredGround> measured_ground(const GroundOptions& options, LoggerRecord& record) {
@@ -105,6 +130,7 @@ Result<MeasuredGround> measured_ground(const GroundOptions& options, LoggerRecor
                     "from wind, gusts of convection and temperatures, air of {:.0f} m above "
                     "the sea",
                     out.setup.height_m))};
+  set_moisture(record, out);
   return out;
 }
 

@@ -4,10 +4,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <limits>
 #include <optional>
+#include <string_view>
+#include <vector>
 
 #include "emit/config/load.hpp"
+#include "emit/config/weather_planes.hpp"
 #include "emit/config/weather_report.hpp"
+#include "emit/physics/csv.hpp"
 #include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/json.hpp"
@@ -24,6 +31,9 @@ struct WeatherOptions {
   std::string scenario;
   std::optional<std::filesystem::path> plot;
   std::optional<std::filesystem::path> json;
+  std::vector<config::WeatherPlane> planes;
+  std::optional<std::filesystem::path> planes_csv;
+  double every_s = 900.0;
 };
 
 constexpr const char* kMonths[] = {"Jan", "Feb", "Mar", "Apr", "May", "Jun",
@@ -244,6 +254,91 @@ std::vector<Plot> plots_of(const WeatherReport& report) {
   return plots;
 }
 
+/// Reads the planes of --planes.
+physics::Result<void> parse_planes(const std::string& text,
+                                   std::vector<config::WeatherPlane>& out) {
+  out.clear();
+  std::string_view rest = text;
+  while (!rest.empty()) {
+    const std::string_view item = rest.substr(0, rest.find(','));
+    rest.remove_prefix(std::min(rest.size(), item.size() + 1));
+    const std::size_t colon = item.find(':');
+    const auto number = [](std::string_view cell) {
+      return physics::csv_number(cell).value_or(std::numeric_limits<double>::quiet_NaN());
+    };
+    const double azimuth_deg = number(item.substr(0, colon));
+    const double tilt_deg = number(colon == std::string_view::npos ? "" : item.substr(colon + 1));
+    // Numbers that are not finite fail the comparisons.
+    if (!(azimuth_deg >= 0.0 && azimuth_deg <= 360.0) || !(tilt_deg >= 0.0 && tilt_deg <= 180.0)) {
+      return physics::make_error(
+          physics::ErrorCode::invalid_argument,
+          fmt::format("'{}' is not AZIMUTH:TILT, 0 to 360 and 0 to 180 degrees", item));
+    }
+    out.push_back({azimuth_deg, tilt_deg});
+  }
+  if (!out.empty()) return {};
+  return physics::make_error(physics::ErrorCode::invalid_argument, "names no plane");
+}
+
+std::string planes_csv_text(const WeatherOptions& options, const config::PlaneCourse& course) {
+  std::string out =
+      "time_s,sun_azimuth_deg,sun_elevation_deg,dni_w_m2,dhi_w_m2,longwave_down_w_m2,"
+      "air_k,wind_m_s,rain_mm_h";
+  for (const config::WeatherPlane& plane : options.planes) {
+    const std::string name = fmt::format("{:g}_{:g}_w_m2", plane.azimuth_deg, plane.tilt_deg);
+    out += fmt::format(",beam_{},sky_{}", name, name);
+  }
+  out += '\n';
+  for (const config::PlaneInstant& row : course.instants) {
+    out += fmt::format("{},{:.5f},{:.5f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f}", row.time_s,
+                       row.sun_azimuth_deg, row.sun_elevation_deg, row.direct_normal_w_m2,
+                       row.diffuse_horizontal_w_m2, row.longwave_down_w_m2, row.air_k, row.wind_m_s,
+                       row.rain_mm_h);
+    for (const config::PlaneIrradiance& plane : row.planes) {
+      fmt::format_to(std::back_inserter(out), ",{:.4f},{:.4f}", plane.beam_w_m2, plane.sky_w_m2);
+    }
+    out += '\n';
+  }
+  return out;
+}
+
+void print_planes(std::FILE* out, const WeatherOptions& options,
+                  const config::PlaneCourse& course) {
+  fmt::print(out, "{:<22}{:>12}{:>12}\n", "plane: azimuth, tilt", "beam kWh/m2", "sky kWh/m2");
+  for (std::size_t p = 0; p < options.planes.size(); ++p) {
+    fmt::print(
+        out, "{:<22}{:>12.1f}{:>12.1f}\n",
+        fmt::format("{:g}, {:g} deg", options.planes[p].azimuth_deg, options.planes[p].tilt_deg),
+        course.sums[p].beam_kwh_m2, course.sums[p].sky_kwh_m2);
+  }
+  fmt::print(out, "\n");
+}
+
+/// Writes what falls on the planes.
+int run_planes(const WeatherOptions& options) {
+  std::optional<config::WeatherOrigin> origin;
+  if (!options.scenario.empty()) {
+    const auto scenario = load_scenario_choice({.scenario = options.scenario, .set = {}});
+    if (!scenario) return fail_config(scenario.error());
+    origin = config::WeatherOrigin{scenario->place, scenario->epoch_utc_ns};
+  }
+  const auto course =
+      config::weather_on_planes(options.file, origin, options.planes, options.every_s);
+  if (!course) return fail_call(course.error());
+  print_planes(text_stream(options.planes_csv), options, *course);
+  if (!options.planes_csv) return kExitOk;
+  const std::string text = planes_csv_text(options, *course);
+  if (*options.planes_csv == "-") {
+    return std::fwrite(text.data(), 1, text.size(), stdout) == text.size()
+               ? kExitOk
+               : fail(kExitFailure, "standard output: write failed");
+  }
+  std::ofstream file(*options.planes_csv, std::ios::binary);
+  file << text;
+  file.close();
+  return file ? kExitOk : fail(kExitFailure, options.planes_csv->string() + ": write failed");
+}
+
 /// Reads the file. A scenario gives a table its place and epoch, and adds what it says about the
 /// file: its span, gaps, place and years.
 physics::Result<WeatherReport> read_report(const WeatherOptions& options) {
@@ -265,6 +360,7 @@ physics::Result<WeatherReport> read_report(const WeatherOptions& options) {
 }
 
 int run(const WeatherOptions& options) {
+  if (!options.planes.empty()) return run_planes(options);
   const auto report = read_report(options);
   if (!report) return fail(report.error());
   print_report(text_stream(options.json), *report);
@@ -295,6 +391,22 @@ void add_options(CommandLine& line, WeatherOptions& options) {
       .type_name("SCENARIO");
   line.output_file("--plot", options.plot, "Diagrams: SVG file");
   add_json(line, options.json);
+  const Option planes =
+      line.parsed(
+              "--planes",
+              [&options](const std::string& text) { return parse_planes(text, options.planes); },
+              "Instead of the report: sun and sky light on planes over the file's year, with the "
+              "sun of a simulation. Azimuth of the normal clockwise from north, tilt from level, "
+              "as 180:90,270:30. The ground reflects nothing, the sky is the same all over")
+          .type_name("AZIMUTH:TILT,...");
+  line.output_file("--planes-csv", options.planes_csv,
+                   "Instants of --planes: CSV file, in seconds of local standard time since 1 "
+                   "January, of a table in simulation time")
+      .needs(planes);
+  line.option("--every", options.every_s, "Seconds between the instants of --planes")
+      .positive()
+      .show_default()
+      .needs(planes);
 }
 
 }  // namespace

@@ -47,6 +47,21 @@ TEST(EntityAir, FollowsTheOwnSpeedAndHeight) {
   EXPECT_GT(slow.begin.windward_w_m2_k, 1.5 * slow.begin.leeward_w_m2_k);
 }
 
+TEST(EntityAir, KeepsTheRelativeHumidityHigherUp) {
+  IntervalForcing forcing = still_air();
+  const double ground_pa = 0.7 * physics::saturation_over_water_pa(288.15);
+  forcing.begin.moist = forcing.end.moist = physics::moist_air(288.15, 101'325.0, ground_pa);
+  const PoseHistory jet(flyer(250.0, 10'000.0), {}, {.length_m = 15.0});
+  const EntityAir aloft = entity_air(jet, forcing, 60 * kSecondNs, 120 * kSecondNs);
+  EXPECT_NEAR(aloft.begin_moist.vapour_pa, 0.7 * physics::saturation_over_water_pa(223.15), 1e-6);
+  EXPECT_LT(aloft.begin_moist.vapour_pa, 0.01 * ground_pa);
+  EXPECT_LT(aloft.end_moist.psychrometric_pa_k, 0.3 * forcing.end.moist.psychrometric_pa_k);
+  const PoseHistory truck(flyer(15.0, 0.0), {}, {.length_m = 6.0});
+  const EntityAir below = entity_air(truck, forcing, 60 * kSecondNs, 120 * kSecondNs);
+  EXPECT_NEAR(below.begin_moist.vapour_pa, ground_pa, 1e-9);
+  EXPECT_NEAR(below.begin_moist.heat_j_m3_k, forcing.begin.moist.heat_j_m3_k, 1e-9);
+}
+
 TEST(EntityAir, GoesOnWithTheMotionThatTheHostSentLast) {
   PoseHistory entity(flyer(0.0, 0.0), {});
   for (int i = 0; i <= 30; ++i) {

@@ -258,6 +258,92 @@ TEST(FosterHistory, WeatherBeforeTheStartRunsTheSpinUpAgain) {
   EXPECT_EQ(history.table()[7], before);
 }
 
+TEST(FosterHistory, RainWetsWhatHoldsWaterAndNothingElse) {
+  scene::ScenarioDesc s = scenario(0.0);
+  s.materials[0].water_store_mm = 0.48;
+  s.materials[1].water_store_mm = 0.48;
+  s.materials[1].solar_absorptance_frac = 0.5;
+  s.materials[3].water_store_mm = 2.0;
+  Environment environment(s);
+  FosterHistory history = history_of(s, environment);
+  EXPECT_EQ(history.materials()[0].water_slot, 0);
+  EXPECT_EQ(history.materials()[1].water_slot, 1);
+  EXPECT_EQ(history.materials()[2].water_slot, -1);
+  EXPECT_EQ(history.materials()[3].water_slot, 2);
+  StepPlan plan(s.thermal);
+  const std::int64_t now_ns = 12600 * kSecondNs;
+  plan.update(now_ns, environment, {});
+  history.update(plan, environment);
+  const double dry_k = history.surroundings_now_k();
+  for (const IntervalForcing& interval : history.intervals()) {
+    for (const double wet_frac : interval.end.wet_frac) ASSERT_EQ(wet_frac, 0.0);
+  }
+  // The host lets it rain for ten minutes, which end five minutes before the frame.
+  scene::WeatherSample live;
+  const physics::Forcing before = environment.forcing_at(now_ns, environment.sun_at(now_ns));
+  live.direct_normal_w_m2 = before.direct_normal_w_m2;
+  live.diffuse_horizontal_w_m2 = before.diffuse_horizontal_w_m2;
+  live.longwave_down_w_m2 = before.longwave_down_w_m2;
+  live.air_k = before.air_k;
+  live.wind_m_s = before.wind_m_s;
+  live.sim_time_ns = now_ns - 900 * kSecondNs;
+  live.rain_mm_h = 12.0;
+  ASSERT_TRUE(environment.append(live));
+  live.sim_time_ns = now_ns - 300 * kSecondNs;
+  live.rain_mm_h = 0.0;
+  ASSERT_TRUE(environment.append(live));
+  plan.update(now_ns, environment, {});
+  history.update(plan, environment);
+  const auto& wet = history.intervals().back().end.wet_frac;
+  EXPECT_GT(wet[0], 0.7);
+  EXPECT_LT(wet[0], 1.0);
+  // The paler ground is cooler and dries more slowly, and the larger store is not full.
+  EXPECT_GT(wet[1], wet[0]);
+  EXPECT_NEAR(wet[2], 1.0, 0.08);
+  EXPECT_EQ(wet[3], 0.0);
+  EXPECT_LT(history.surroundings_now_k(), dry_k - 3.0);
+  // Wetness stays a share, and old intervals are dry.
+  for (const IntervalForcing& interval : history.intervals()) {
+    for (const double wet_frac : interval.begin.wet_frac) {
+      ASSERT_GE(wet_frac, 0.0);
+      ASSERT_LE(wet_frac, 1.0);
+    }
+  }
+  EXPECT_EQ(history.intervals().front().begin.wet_frac[0], 0.0);
+  // The state that goes from node to node has the water: going on from it dries the ground.
+  const GroundState state = history.surroundings();
+  EXPECT_GT(state.water[0].water_mm, 0.2);
+  const IntervalForcing later = history.extend(now_ns, now_ns + 600 * kSecondNs, environment);
+  EXPECT_LT(later.end.wet_frac[0], wet[0]);
+  history.restore_surroundings(state);
+  const IntervalForcing again = history.extend(now_ns, now_ns + 600 * kSecondNs, environment);
+  EXPECT_EQ(again.end.wet_frac[0], later.end.wet_frac[0]);
+  environment.reset();
+  plan.update(now_ns, environment, {});
+  history.update(plan, environment);
+  EXPECT_EQ(history.surroundings_now_k(), dry_k);
+}
+
+TEST(FosterHistory, SoilStartsAsWetAsStatedAndDriesWithoutRain) {
+  scene::ScenarioDesc s = scenario(0.0);
+  s.materials[0].water_store_mm = 19.0;
+  s.materials[0].readily_evaporable_mm = 9.0;
+  s.materials[0].wetness_frac = 0.6;
+  EXPECT_TRUE(scene::moisture_of(s.materials[0]).dry());
+  const Environment environment(s);
+  FosterHistory history = history_of(s, environment);
+  StepPlan plan(s.thermal);
+  plan.update(3600 * kSecondNs, environment, {});
+  history.update(plan, environment);
+  const double wet_frac = history.intervals().front().begin.wet_frac[0];
+  // Some 4 of 6 mm evaporate in two days of June. The wetness that is left counts with eq. 65.
+  EXPECT_LT(wet_frac, 0.15);
+  EXPECT_GT(wet_frac, 0.02);
+  const double left_mm = history.surroundings().water[0].water_mm;
+  EXPECT_LT(left_mm, 4.5);
+  EXPECT_GT(left_mm, 1.0);
+}
+
 TEST(FosterHistoryContract, ForcingHasOneEntryPerInterval) {
   scene::ScenarioDesc s = scenario(0.0);
   s.thermal.spin_up_ns = 0;

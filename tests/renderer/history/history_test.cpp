@@ -258,5 +258,45 @@ TEST(Environment, weather_from_the_host_holds_from_its_time_on) {
   EXPECT_GT(environment.forcing_at(7200 * kSecondNs, sun).direct_normal_w_m2, 0.0);
 }
 
+TEST(Environment, RainOfTheHostFollowsThatOfTheTable) {
+  scene::ScenarioDesc scenario = clear_day();
+  for (const std::int64_t hour : {0, 1, 2, 3}) {
+    scene::WeatherSample row;
+    row.sim_time_ns = hour * 3600 * kSecondNs;
+    row.air_k = 290.0;
+    row.longwave_down_w_m2 = 330.0;
+    row.rain_mm_h = hour == 1 ? 2.0 : 0.0;
+    scenario.weather.push_back(row);
+  }
+  Environment environment(scenario);
+  const auto rain_mm = [&](double from_h, double to_h) {
+    return environment.rain_mm(std::llround(from_h * 3.6e12), std::llround(to_h * 3.6e12));
+  };
+  EXPECT_TRUE(environment.rains());
+  EXPECT_NEAR(rain_mm(0.0, 3.0), 2.0, 1e-12);
+  EXPECT_NEAR(rain_mm(0.5, 0.75), 0.5, 1e-12);
+  // A row of the host rains until the next one.
+  scene::WeatherSample live = scenario.weather.back();
+  live.sim_time_ns = 1800 * kSecondNs;
+  live.rain_mm_h = 6.0;
+  ASSERT_TRUE(environment.append(live));
+  EXPECT_NEAR(rain_mm(0.0, 1.0), 1.0 + 3.0, 1e-12);
+  live.sim_time_ns = 5400 * kSecondNs;
+  live.rain_mm_h = 0.0;
+  ASSERT_TRUE(environment.append(live));
+  EXPECT_NEAR(rain_mm(0.0, 24.0), 1.0 + 6.0, 1e-12);
+  EXPECT_NEAR(rain_mm(1.0, 1.25), 1.5, 1e-12);
+  // The plan hands on all of it, whatever its steps are.
+  StepPlan plan(scenario.thermal);
+  plan.update(12600 * kSecondNs, environment, {});
+  double sum_mm = 0.0;
+  for (const auto& interval : plan.intervals()) sum_mm += interval.rain_mm;
+  const auto intervals = plan.intervals();
+  EXPECT_NEAR(sum_mm, environment.rain_mm(intervals.front().begin_ns, intervals.back().end_ns),
+              1e-9);
+  environment.reset();
+  EXPECT_NEAR(rain_mm(0.0, 24.0), 2.0, 1e-12);
+}
+
 }  // namespace
 }  // namespace emit::renderer

@@ -12,8 +12,11 @@
 
 #include "emit/config/load.hpp"
 #include "emit/physics/constants.hpp"
+#include "emit/physics/evaporation.hpp"
 #include "emit/physics/step_nodes.hpp"
+#include "emit/physics/weather.hpp"
 #include "emit/reference/surface_forcing.hpp"
+#include "emit/reference/surface_water.hpp"
 #include "emit/renderer/surface_forcing.hpp"
 #include "emit/scene/base.hpp"
 #include "history/foster_history.hpp"
@@ -196,6 +199,171 @@ TEST(ReferenceEvaporation, LawnAtNoonIsNearTheAirAndNotNearItsDryLayers) {
     EXPECT_LT(wet_k - air_k, 10.0) << name;
     EXPECT_GT(dry_k - wet_k, 5.0) << name;
   }
+}
+
+/// Temperate summer as a table, with a shower of half an hour at the start of the day's frames.
+scene::ScenarioDesc shower(double rain_mm_h) {
+  scene::ScenarioDesc scenario = climate_scenario("temperate_summer");
+  scenario.thermal.history_start_ns = -48 * kHourNs;
+  scenario.thermal.spin_up_ns = 0;
+  const physics::GeoPlace place{physics::Radians(scenario.place.lat_rad),
+                                physics::Radians(scenario.place.lon_rad),
+                                physics::Metres(scenario.place.height_m)};
+  for (std::int64_t t = -48 * kHourNs; t <= 24 * kHourNs; t += 15 * kMinuteNs) {
+    const std::int64_t utc_ns = scenario.epoch_utc_ns + t;
+    const physics::Forcing f = physics::forcing_from_clear_sky(
+        scenario.clear_sky, place, physics::sun_position(utc_ns, place), utc_ns);
+    const bool rains = t > 0 && t <= kHourNs / 2;
+    scene::WeatherSample row;
+    row.sim_time_ns = t;
+    row.direct_normal_w_m2 = rains ? 0.0 : f.direct_normal_w_m2;
+    row.diffuse_horizontal_w_m2 = f.diffuse_horizontal_w_m2;
+    row.longwave_down_w_m2 = f.longwave_down_w_m2;
+    row.air_k = f.air_k;
+    row.wind_m_s = f.wind_m_s;
+    row.relative_humidity_frac = f.vapour_pa / physics::saturation_over_water_pa(f.air_k);
+    row.rain_mm_h = rains ? rain_mm_h : 0.0;
+    scenario.weather.push_back(row);
+  }
+  return scenario;
+}
+
+/// Time after the shower at which the wetness of level ground falls below a share, h.
+template <class At>
+double dry_h(const At& wet_at, double share) {
+  for (std::int64_t t = kHourNs / 2; t <= 24 * kHourNs; t += kMinuteNs) {
+    if (wet_at(t) < share)
+      return static_cast<double>(t - kHourNs / 2) / static_cast<double>(kHourNs);
+  }
+  return 24.0;
+}
+
+TEST(ReferenceRain, GroundDriesAsTheReferenceDoes) {
+  const scene::ScenarioDesc wet = shower(8.0);
+  const scene::ScenarioDesc dry = shower(0.0);
+  std::vector<std::int64_t> nodes_ns;
+  for (std::int64_t t = -48 * kHourNs; t < 0; t += 30 * kMinuteNs) nodes_ns.push_back(t);
+  const std::size_t judged_from = nodes_ns.size();
+  for (std::int64_t t = 0; t <= 24 * kHourNs; t += 5 * kMinuteNs) nodes_ns.push_back(t);
+  reference::ClimateOptions options;
+  options.end_ns = nodes_ns.back();
+  const auto climate = reference::SurfaceClimate::create(wet, options);
+  const auto dry_climate = reference::SurfaceClimate::create(dry, options);
+  ASSERT_TRUE(climate.has_value()) << climate.error().text;
+  ASSERT_TRUE(dry_climate.has_value());
+  for (const char* name :
+       {"asphalt", "concrete_pavement", "roof_tile_clay", "gravel", "lawn", "soil", "sand"}) {
+    const auto material = std::ranges::find(wet.materials, name, &scene::Material::name);
+    ASSERT_NE(material, wet.materials.end()) << name;
+    const auto forcing = renderer::surface_forcing(wet, nodes_ns, std::span(&*material, 1));
+    const auto dry_forcing = renderer::surface_forcing(dry, nodes_ns, std::span(&*material, 1));
+    ASSERT_TRUE(forcing.has_value() && dry_forcing.has_value());
+    const Courses course = courses_of(wet, *material, *climate, nodes_ns, *forcing);
+    const Courses parched = courses_of(dry, *material, *dry_climate, nodes_ns, *dry_forcing);
+    double squares = 0.0;
+    double worst_k = 0.0;
+    double cooler_k = 0.0;
+    for (std::size_t i = judged_from; i < forcing->size(); ++i) {
+      const double off_k = course.model_k[i] - course.truth_k[i];
+      squares += off_k * off_k;
+      worst_k = std::max(worst_k, std::abs(off_k));
+      cooler_k = std::max(cooler_k, parched.truth_k[i] - course.truth_k[i]);
+    }
+    const double rms_k = std::sqrt(squares / static_cast<double>(forcing->size() - judged_from));
+    // Compare the water itself.
+    const auto mesh = reference::material_mesh(*material);
+    ASSERT_TRUE(mesh.has_value());
+    const auto water = reference::water_course(climate->nodes(), *material,
+                                               material->initial_k.value_or(wet.thermal.initial_k),
+                                               climate->surroundings_reflectance_frac(), *mesh);
+    ASSERT_FALSE(water.empty());
+    const auto model_wet = [&](std::int64_t t) {
+      const auto after = std::ranges::upper_bound(nodes_ns, t);
+      const auto i =
+          std::min(static_cast<std::size_t>(after - nodes_ns.begin()) - 1, forcing->size() - 1);
+      const double way =
+          static_cast<double>(t - nodes_ns[i]) / static_cast<double>(nodes_ns[i + 1] - nodes_ns[i]);
+      return std::lerp((*forcing)[i].begin.wet_frac[0], (*forcing)[i].end.wet_frac[0], way);
+    };
+    const auto true_wet = [&](std::int64_t t) { return water.at(t); };
+    const double model_h = dry_h(model_wet, 0.1);
+    const double truth_h = dry_h(true_wet, 0.1);
+    // All rain has gone somewhere.
+    EXPECT_NEAR(water.lost_mm + water.water_mm.back(), 4.0, 1e-6 * 4.0) << name;
+    EXPECT_LT(rms_k, 0.4) << name;
+    EXPECT_LT(worst_k, 1.5) << name;
+    EXPECT_GT(cooler_k, 2.0) << name;
+    EXPECT_NEAR(model_h, truth_h, 0.1 + 0.1 * truth_h) << name;
+    std::printf(
+        "%-18s rms %.3f K, max %.3f K; up to %.1f K cooler than dry; wetness below 0.1 "
+        "after %.2f h, reference %.2f h\n",
+        name, rms_k, worst_k, cooler_k, model_h, truth_h);
+  }
+}
+
+TEST(ReferenceRain, SoilDriesAsFao56Says) {
+  // FAO-56 eq. 74 to 77 with the evaporation of soil that stays wet: day by day, in small steps,
+  // dDe = Kr(De) E_wet.
+  scene::ScenarioDesc scenario = climate_scenario("temperate_summer");
+  scenario.thermal.history_start_ns = -48 * kHourNs;
+  scenario.thermal.spin_up_ns = 0;
+  const auto found = std::ranges::find(scenario.materials, "soil", &scene::Material::name);
+  ASSERT_NE(found, scenario.materials.end());
+  scene::Material soil = *found;
+  soil.wetness_frac = 1.0;
+  scene::Material wet = soil;
+  wet.water_store_mm = 1e4;
+  wet.readily_evaporable_mm = 9e3;
+  reference::ClimateOptions options;
+  options.end_ns = 8 * 24 * kHourNs;
+  const auto climate = reference::SurfaceClimate::create(scenario, options);
+  ASSERT_TRUE(climate.has_value());
+  const auto course = [&](const scene::Material& material) {
+    const auto mesh = reference::material_mesh(material);
+    EXPECT_TRUE(mesh.has_value());
+    return reference::water_course(climate->nodes(), material, scenario.thermal.initial_k,
+                                   climate->surroundings_reflectance_frac(), *mesh);
+  };
+  const reference::WaterCourse dries = course(soil);
+  const reference::WaterCourse stays = course(wet);
+  const double total_mm = *soil.water_store_mm;
+  const double ready_mm = *soil.readily_evaporable_mm;
+  double gone_mm = 0.0;
+  double worst_mm = 0.0;
+  for (std::size_t i = 1; i < dries.time_ns.size(); ++i) {
+    const double open_mm = stays.water_mm[i - 1] - stays.water_mm[i];
+    const double kr = std::clamp((total_mm - gone_mm) / (total_mm - ready_mm), 0.0, 1.0);
+    gone_mm = std::clamp(gone_mm + (open_mm > 0.0 ? kr : 1.0) * open_mm, 0.0, total_mm);
+    worst_mm = std::max(worst_mm, std::abs(total_mm - dries.water_mm[i] - gone_mm));
+    if (dries.time_ns[i] % (24 * kHourNs) == 0) {
+      std::printf("day %2d: %.2f mm gone, FAO-56 %.2f mm, wet soil %.2f mm\n",
+                  static_cast<int>(dries.time_ns[i] / (24 * kHourNs)) + 2,
+                  total_mm - dries.water_mm[i], gone_mm, 1e4 - stays.water_mm[i]);
+    }
+  }
+  EXPECT_GT(gone_mm, 15.0);
+  EXPECT_LT(worst_mm, 0.8);
+}
+
+TEST(ReferenceRain, LongStepsLoseNoWater) {
+  // Steps of an hour, as far back in a history, against those of a minute: what fell between two
+  // steps counts, and what is left later is the same.
+  const scene::ScenarioDesc wet = shower(8.0);
+  const auto material = std::ranges::find(wet.materials, "soil", &scene::Material::name);
+  std::vector<double> left;
+  for (const std::int64_t step_ns : {kMinuteNs, 20 * kMinuteNs, kHourNs}) {
+    std::vector<std::int64_t> nodes_ns;
+    for (std::int64_t t = -48 * kHourNs; t <= 24 * kHourNs; t += step_ns) nodes_ns.push_back(t);
+    const auto forcing = renderer::surface_forcing(wet, nodes_ns, std::span(&*material, 1));
+    ASSERT_TRUE(forcing.has_value());
+    double rain_mm = 0.0;
+    for (const auto& interval : *forcing) rain_mm += interval.rain_mm;
+    EXPECT_NEAR(rain_mm, 4.0, 4e-6);
+    left.push_back(forcing->back().end.wet_frac[0]);
+  }
+  EXPECT_GT(left[0], 0.05);
+  EXPECT_NEAR(left[1], left[0], 0.02);
+  EXPECT_NEAR(left[2], left[0], 0.04);
 }
 
 }  // namespace

@@ -220,7 +220,7 @@ TEST(LoadScene, evaporation_that_does_not_hold_is_warned_of) {
   for (Material& material : scenario.materials) material.surface_resistance_s_m = 0.0;
   scene = load_scene(scenario);
   ASSERT_EQ(scene->warnings.size(), 1U);
-  EXPECT_THAT(scene->warnings[0], HasSubstr("drying is not modelled"));
+  EXPECT_THAT(scene->warnings[0], HasSubstr("drying needs 'readily_evaporable_mm'"));
   // The published model leaves evaporation out.
   scenario.thermal.model = ThermalModel::emit2014;
   scene = load_scene(scenario);

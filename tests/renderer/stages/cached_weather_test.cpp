@@ -119,6 +119,56 @@ TEST(RendererCachedWeather, WhatIsToldEverySecondIsFollowed) {
   }
 }
 
+TEST(RendererCachedWeather, RainActsFromItsInstantOn) {
+  auto scenario = open_ground();
+  scenario.materials[0].water_store_mm = 0.48;
+  const auto pose = looking({0.0, -0.01, 12.0}, {0.0, 0.0, 0.0});
+  const std::int64_t event_ns = 2 * kHourNs + 28 * kFrameNs;
+  std::vector told{weather_at(scenario, event_ns, 1.0),
+                   weather_at(scenario, event_ns + 40 * kSecondNs, 1.0)};
+  told[0].rain_mm_h = 12.0;
+  Session run(scenario);
+  std::int64_t now_ns = 2 * kHourNs + kFrameNs / 2;
+  (void)run.frame_k(now_ns, pose);
+  std::size_t next = 0;
+  double most_off_k = 0.0;
+  float is_k = 0.0F;
+  for (int frame = 0; now_ns < event_ns + 100 * kSecondNs; ++frame) {
+    now_ns += kFrameNs;
+    if (next < told.size() && now_ns >= told[next].sim_time_ns) {
+      ASSERT_TRUE(run.renderer().apply_weather(told[next++]));
+    }
+    is_k = run.frame_k(now_ns, pose)[kMiddle];
+    // The ground takes in a change over ten frames.
+    if (now_ns < event_ns + 4 * kSecondNs || frame % 8 != 0) continue;
+    most_off_k = std::max(most_off_k, std::abs(is_k - told_ground_k(scenario, told, now_ns)));
+  }
+  EXPECT_LT(most_off_k, 0.2);
+  EXPECT_GT(open_ground_k(scenario, now_ns) - is_k, 1.5);
+  EXPECT_FALSE(run.coarse());
+}
+
+TEST(RendererCachedWeather, FramesSayThatNobodyKnowsWhatRainDoes) {
+  const auto scenario = open_ground();  // its material has no store of water
+  const auto pose = looking({0.0, -0.01, 12.0}, {0.0, 0.0, 0.0});
+  renderer::OutputOptions output;
+  auto made = renderer::Renderer::create(scenario, {}, output);
+  ASSERT_TRUE(made) << made.error().text;
+  const auto unknown = [&](std::int64_t at_ns) {
+    renderer::FrameRequest request;
+    request.sim_time_ns = request.thermal_time_ns = at_ns;
+    request.sensor_pose = pose;
+    const auto slot = static_cast<renderer::SlotIndex>((*made)->submit(request));
+    return (*made)->collect(slot).stats.unknown_wet;
+  };
+  EXPECT_EQ(unknown(2 * kHourNs), 0U);
+  scene::WeatherSample told = weather_at(scenario, 2 * kHourNs + kSecondNs, 1.0);
+  told.rain_mm_h = 60.0;
+  ASSERT_TRUE((*made)->apply_weather(told));
+  EXPECT_EQ(unknown(2 * kHourNs + 2 * kSecondNs), 0U) << "drops";
+  EXPECT_EQ(unknown(2 * kHourNs + 10 * kSecondNs), 1U);
+}
+
 TEST(RendererCachedWeather, FramesSayWhileSomeSurfacesDoNotKnowYet) {
   const auto scenario = open_ground();
   const auto pose = looking({0.0, -0.01, 12.0}, {0.0, 0.0, 0.0});

@@ -127,6 +127,44 @@ TEST(RendererFoster, MoistGroundFollowsTheModelInDoubleAndIsCoolerThanDry) {
   }
 }
 
+TEST(RendererFoster, RainedOnGroundFollowsTheModelInDouble) {
+  auto scenario = foster_scenario(write_quads("plane", {ground(50.0, 50.0)}));
+  scenario.materials[0].water_store_mm = 0.48;
+  const renderer::Environment clear(scenario);
+  for (int quarter = -4 * 49; quarter <= 4 * 17; ++quarter) {
+    const std::int64_t at_ns = quarter * (kHourNs / 4);
+    const physics::Forcing f = clear.forcing_at(at_ns, clear.sun_at(at_ns));
+    scene::WeatherSample row;
+    row.sim_time_ns = at_ns;
+    row.direct_normal_w_m2 = f.direct_normal_w_m2;
+    row.diffuse_horizontal_w_m2 = f.diffuse_horizontal_w_m2;
+    row.longwave_down_w_m2 = f.longwave_down_w_m2;
+    row.air_k = f.air_k;
+    row.wind_m_s = f.wind_m_s;
+    row.relative_humidity_frac = 0.5;
+    row.rain_mm_h = quarter > 8 && quarter <= 12 ? 1.0 : 0.0;  // from 2 h to 3 h
+    scenario.weather.push_back(row);
+  }
+  scene::ScenarioDesc dry = scenario;
+  dry.materials[0].water_store_mm.reset();
+  const auto pose = looking({0.0, -5.0, 5.0}, {0.0, 0.0, 0.0});
+  for (const double hours : {2.5, 3.25, 8.0}) {
+    const auto now_ns = static_cast<std::int64_t>(hours * static_cast<double>(kHourNs));
+    const double expected = expected_k(scenario, now_ns, {0.0, 0.0, 1.0});
+    double worst_k = 0.0;
+    for (const float t : render_k(scenario, pose, now_ns)) {
+      worst_k = std::max(worst_k, std::abs(t - expected));
+    }
+    EXPECT_LT(worst_k, 0.01) << hours << " h";
+    const double dry_k = expected_k(dry, now_ns, {0.0, 0.0, 1.0});
+    if (hours < 4.0) {
+      EXPECT_LT(expected, dry_k - 3.0) << hours;
+    } else {
+      EXPECT_NEAR(expected, dry_k, 1.5) << "it has dried";
+    }
+  }
+}
+
 TEST(RendererFoster, TiltedFacesFollowTheModelInDouble) {
   // Look at a plate from its front. It is open, so its obscurance is that of flat ground. No plate
   // turns to or from the sun within an interval, where the clamped cosine of the shader would be

@@ -3,7 +3,9 @@
 
 #include <bit>
 #include <limits>
+#include <numbers>
 
+#include "emit/physics/evaporation.hpp"
 #include "gateway/cigi_weather.hpp"
 
 namespace emit::server {
@@ -47,6 +49,57 @@ TEST(CigiWeather, AirAndWindReplaceThoseOfTheClearSky) {
   EXPECT_NEAR(later->air_k, 280.15, 1e-4);
   weather.clear();
   EXPECT_FALSE(weather.take_change(9 * 3600 * kSecondNs));
+}
+
+TEST(CigiWeather, HumidityAndDirectionOfTheWindReachTheSurfaces) {
+  const scene::ScenarioDesc scenario = scenario_at_noon();
+  CigiWeather weather(&scenario);
+  cigi::AtmosphereControl packet;
+  packet.air_temperature_c = 20.0F;
+  packet.humidity_percent = 80;
+  packet.wind_from_deg = -90.0F;
+  ASSERT_TRUE(weather.take(packet));
+  const auto moist = weather.take_change(0);
+  ASSERT_TRUE(moist);
+  EXPECT_NEAR(*moist->relative_humidity_frac, 0.8, 1e-12);
+  EXPECT_NEAR(*moist->wind_from_deg, 270.0, 1e-12);
+  // Drier air has a colder sky.
+  packet.humidity_percent = 20;
+  ASSERT_TRUE(weather.take(packet));
+  const auto dry = weather.take_change(0);
+  EXPECT_LT(dry->longwave_down_w_m2, moist->longwave_down_w_m2 - 20.0);
+  // A host that knows no humidity sends 0 %: the scenario's holds.
+  packet.humidity_percent = 0;
+  ASSERT_TRUE(weather.take(packet));
+  const auto unknown = weather.take_change(0);
+  const double vapour_pa =
+      *unknown->relative_humidity_frac * physics::saturation_over_water_pa(unknown->air_k);
+  EXPECT_NEAR(vapour_pa, physics::saturation_over_water_pa(scenario.clear_sky.dew_point_k), 0.01);
+}
+
+TEST(CigiWeather, KeepsWhatTheTableStatesBesidesItsColumns) {
+  scene::ScenarioDesc scenario = scenario_at_noon();
+  for (const std::int64_t hour : {0, 1, 2}) {
+    scene::WeatherSample row;
+    row.sim_time_ns = hour * 3600 * kSecondNs;
+    row.air_k = 290.0;
+    row.longwave_down_w_m2 = 330.0;
+    row.relative_humidity_frac = 0.9;
+    row.wind_from_rad = 1.0;
+    row.rain_mm_h = hour == 1 ? 2.5 : 0.0;
+    scenario.weather.push_back(row);
+  }
+  CigiWeather weather(&scenario);
+  cigi::WeatherControl layer;
+  layer.layer_id = 1;
+  layer.enabled = true;
+  layer.coverage_percent = 50.0F;
+  ASSERT_TRUE(weather.take(layer));
+  const auto change = weather.take_change(1800 * kSecondNs);
+  ASSERT_TRUE(change);
+  EXPECT_NEAR(*change->relative_humidity_frac, 0.9, 1e-9);
+  EXPECT_NEAR(*change->wind_from_deg, 180.0 / std::numbers::pi, 1e-9);
+  EXPECT_EQ(change->rain_mm_h, 2.5);
 }
 
 TEST(CigiWeather, CloudsCoverAndWarmTheSky) {

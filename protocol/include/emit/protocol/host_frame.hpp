@@ -41,6 +41,9 @@ struct EnvironmentData {
   double cloud_frac = 0.0;
   std::optional<double> environment_k;
   std::optional<double> film_w_m2_k;
+  std::optional<double> wind_from_deg;           ///< clockwise from north
+  std::optional<double> relative_humidity_frac;  ///< over water
+  double rain_mm_h = 0.0;
 };
 
 /// Largest number of commands to parts in one host frame.

@@ -129,6 +129,9 @@ struct FrameStats {
   /// Small targets without a window of their own, because a frame has no more windows or its draws
   /// fill their memory. They have one sample per pixel, so their energy is not kept.
   std::uint32_t plain_targets = 0;
+  /// Materials of the scene that look up and do not state what rain does to them, in a frame at
+  /// most six hours after rain. Their surfaces are shown dry.
+  std::uint32_t unknown_wet = 0;
   /// Wall time that this frame spent on preparing the surface anew because the thermal time had
   /// jumped, s. It is 0 in other frames. Such a frame is also `coarse`.
   double rewarm_s = 0.0;

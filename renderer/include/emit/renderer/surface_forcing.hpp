@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <array>
 #include <cstdint>
 #include <glm/ext/vector_double3.hpp>
 #include <span>
 #include <vector>
 
 #include "emit/physics/air_film.hpp"
+#include "emit/physics/climate/surface_water.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/physics/evaporation.hpp"
 #include "emit/physics/foster.hpp"
@@ -27,21 +29,26 @@ struct SurfaceForcing {
   physics::AirFilm film;          ///< film of scenery in that flow
   double air_k = 0.0;             ///< air temperature
   physics::MoistAir moist;        ///< moisture of the air
+  /// Share of open, level ground that rain has wetted, by slot (FosterMaterial::water_slot).
+  std::array<double, physics::kWaterSlots> wet_frac{};
 };
 /// Forcing over an interval. It goes linearly from begin to end.
 struct IntervalForcing {
   SurfaceForcing begin;
   SurfaceForcing end;
-  double dt_s = 0.0;  ///< length of the interval, > 0
+  double dt_s = 0.0;     ///< length of the interval, > 0
+  double rain_mm = 0.0;  ///< depth that falls in it
 };
 
 /// Forcing over the intervals between the instants `nodes_ns` (sim time). Entry i goes from node i
 /// to node i + 1. With the model emit2014 the surroundings have the temperature of the weather and
 /// reflect nothing. With foster they are an open, level surface that is steady at the first node
-/// and is integrated along. Thread: any. Errors: invalid_argument (fewer than two nodes, or nodes
-/// that do not ascend), config (the material of the surroundings does not exist).
+/// and is integrated along, as is the ground of those `materials` that hold water. Thread: any.
+/// Errors: invalid_argument (fewer than two nodes, or nodes that do not ascend), config (the
+/// material of the surroundings does not exist).
 [[nodiscard]] physics::Result<std::vector<IntervalForcing>> surface_forcing(
-    const scene::ScenarioDesc& scenario, std::span<const std::int64_t> nodes_ns);
+    const scene::ScenarioDesc& scenario, std::span<const std::int64_t> nodes_ns,
+    std::span<const scene::Material> materials = {});
 
 /// Material of the extended thermal model.
 struct FosterMaterial {
@@ -53,6 +60,8 @@ struct FosterMaterial {
   double prescribed_k = 0.0;
   double roughness = 1.0;          ///< factor of the forced part of the film (physics.md eq. 34)
   physics::MoistSurface moisture;  ///< exchange of water with the air
+  physics::WaterStore store;       ///< room for rain water
+  int water_slot = -1;             ///< of SurfaceForcing::wet_frac; -1: it holds no water
   bool sheet = false;              ///< driven by the mean of the fluxes that its two faces receive
   bool body = false;               ///< the base is the interior of a body, which starts at base_k
   /// Layers in which heat moves sideways; empty for sheets and for prescribed temperatures.
@@ -64,6 +73,18 @@ struct FosterMaterial {
 
   [[nodiscard]] bool prescribed() const noexcept { return network.count == 0; }
 };
+
+/// Returns the exchange of water of a face whose normal has that vertical part.
+[[nodiscard]] inline physics::MoistSurface moisture_at(const FosterMaterial& material,
+                                                       const SurfaceForcing& forcing,
+                                                       double up) noexcept {
+  physics::MoistSurface out = material.moisture;
+  if (material.water_slot >= 0) {
+    out.film_frac =
+        physics::face_wet_frac(forcing.wet_frac[static_cast<std::size_t>(material.water_slot)], up);
+  }
+  return out;
+}
 
 /// Networks and constants of materials. A material uses its own modes; they are derived from its
 /// layers where it has none or where the scenario asks for another number of modes. Thread: any.

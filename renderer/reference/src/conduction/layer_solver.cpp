@@ -45,7 +45,8 @@ struct BalanceFace {
           .vapour_pa = mix(a.moisture->vapour_pa, b.moisture->vapour_pa),
           .pressure_pa = mix(a.moisture->pressure_pa, b.moisture->pressure_pa),
           .wetness_frac = a.moisture->wetness_frac,
-          .resistance_s_m = mix(a.moisture->resistance_s_m, b.moisture->resistance_s_m)};
+          .resistance_s_m = mix(a.moisture->resistance_s_m, b.moisture->resistance_s_m),
+          .film_frac = mix(a.moisture->film_frac, b.moisture->film_frac)};
       return sensible_w_m2 - now.latent_w_m2(k, air_k, h_w_m2_k);
     };
     // Take the slope of what follows the temperature by differences.
@@ -125,9 +126,11 @@ double FaceMoisture::latent_w_m2(double face_k, double air_k, double film_w_m2_k
   const double film_s_m = density_kg_m3 * kHeatJKgK / film_w_m2_k;
   const double excess_pa = saturation_pa(face_k) - vapour_pa;
   const bool dew = excess_pa < 0.0;
-  const double share = dew ? 1.0 : wetness_frac;
-  const double water_kg_m2_s = share * density_kg_m3 * kVapourRatio * excess_pa / pressure_pa /
-                               (film_s_m + (dew ? 0.0 : resistance_s_m));
+  const double open_kg_m2_s = density_kg_m3 * kVapourRatio * excess_pa / pressure_pa / film_s_m;
+  const bool dry = !(wetness_frac > 0.0) && !(film_frac > 0.0);
+  const double rest = wetness_frac * film_s_m / (film_s_m + resistance_s_m);
+  const double share = dry ? 0.0 : dew ? 1.0 : film_frac + (1.0 - film_frac) * rest;
+  const double water_kg_m2_s = share * open_kg_m2_s;
   const double latent_j_kg = 2.501e6 - 2361.0 * (air_k - physics::kZeroCelsiusK);
   return latent_j_kg * water_kg_m2_s;
 }
@@ -553,6 +556,7 @@ void face_history(LayerSolver& solver, std::span<const ProfilePoint> profile,
             moisture->pressure_pa = mix(a.face.moisture->pressure_pa, b.face.moisture->pressure_pa);
             moisture->resistance_s_m =
                 mix(a.face.moisture->resistance_s_m, b.face.moisture->resistance_s_m);
+            moisture->film_frac = mix(a.face.moisture->film_frac, b.face.moisture->film_frac);
           }
           return FaceState{mix(a.face.absorbed_w_m2, b.face.absorbed_w_m2),
                            mix(a.face.film_w_m2_k, b.face.film_w_m2_k),

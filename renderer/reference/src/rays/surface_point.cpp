@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <limits>
 
 #include "emit/physics/check.hpp"
 #include "emit/reference/surface_forcing.hpp"
+#include "emit/reference/surface_water.hpp"
 
 namespace emit::reference {
 namespace {
@@ -19,7 +21,9 @@ ClimateNode mix(const ClimateNode& a, const ClimateNode& b, double f) noexcept {
           at(a.air_k, b.air_k),
           physics::between_flows(a.flow, b.flow, f),
           at(a.surroundings_k, b.surroundings_k),
-          at(a.vapour_pa, b.vapour_pa)};
+          at(a.vapour_pa, b.vapour_pa),
+          at(a.rain_mm, b.rain_mm),
+          at(a.wet_frac, b.wet_frac)};
 }
 
 /// Interpolates a view.
@@ -68,6 +72,10 @@ PointSolver::PointSolver(const SurfaceClimate& climate, const LayerMesh& mesh,
       spin_up_k_(mesh.nodes()) {
   start_profile_ = steady_profile(solid_layers(material.layers), initial_k_,
                                   material.sheet ? initial_k_ : material.base_k);
+  if (material.prescribed_k) return;
+  wet_frac_ = water_course(climate.nodes(), material, initial_k_,
+                           climate.surroundings_reflectance_frac(), mesh, steps)
+                  .wet_frac;
 }
 
 double PointSolver::seconds(std::int64_t time_ns) const noexcept {
@@ -92,7 +100,16 @@ void PointSolver::advance(const SurfaceOptics& surface, const Views& views,
     }
     // Build the state of the face. A sheet takes the mean of both faces, physics.md eq. 24.
     const auto state = [&](std::int64_t time_ns) {
-      const ClimateNode climate = value_at(nodes, time_ns, climate_row_);
+      ClimateNode climate = value_at(nodes, time_ns, climate_row_);
+      if (!wet_frac_.empty()) {
+        // Interpolate as the climate is.
+        ClimateNode a = nodes[climate_row_];
+        a.wet_frac = wet_frac_[climate_row_];
+        const std::size_t next = std::min(climate_row_ + 1, nodes.size() - 1);
+        ClimateNode b = nodes[next];
+        b.wet_frac = wet_frac_[next];
+        climate.wet_frac = value_at(std::array{a, b}, time_ns, 0).wet_frac;
+      }
       const double reflectance_frac = climate_->surroundings_reflectance_frac();
       FaceState face =
           face_state(climate, surface, value_at(views.front, time_ns, view_row_), reflectance_frac);
@@ -141,7 +158,8 @@ void PointSolver::run(const glm::dvec3& normal, const Views& views,
                               material_->emissivity_frac,
                               scene::roughness_factor(material_->roughness),
                               material_->sheet,
-                              scene::moisture_of(*material_)};
+                              scene::moisture_of(*material_),
+                              !wet_frac_.empty()};
   // Repeat the spin-up only for another orientation.
   if (!has_spin_up_ || normal != spin_up_normal_) spin_up(surface);
   const std::int64_t start_ns = climate_->history_start_ns();

@@ -104,6 +104,9 @@ class Environment:
     cloud_frac: float
     environment_k: float | None = None
     film_w_m2_k: float | None = None
+    wind_from_deg: float | None = None  # clockwise from north; None: all directions count alike
+    relative_humidity_frac: float | None = None  # over water; None: the scenario's dew point counts
+    rain_mm_h: float = 0.0
 
     def to_message(self) -> host_pb2.Environment:
         return host_pb2.Environment(**{name: value for name, value in dataclasses.asdict(self).items()

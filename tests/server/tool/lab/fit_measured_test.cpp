@@ -160,6 +160,43 @@ TEST(CliBenchNature, a_day_of_the_model_itself_is_met_and_its_numbers_are_found)
   EXPECT_THAT(bench.out, HasSubstr("MISSED"));
 }
 
+TEST(CliBenchNature, moist_ground_evaporates_where_the_humidity_is_known) {
+  const TemporaryFolder folder;
+  // The same day of grass, with and without a column of the humidity.
+  std::string with = logger_text(kHeader);
+  std::istringstream lines(with);
+  std::string moist;
+  std::string line;
+  while (std::getline(lines, line)) {
+    if (line[0] == '#')
+      moist += "# Moist grass.\n" + line + "\n";
+    else
+      moist += line + (line.starts_with("time_s") ? ",rh_pct\n" : ",65\n");
+  }
+  write_text(folder.file("moist.csv"), moist);
+  write_text(folder.file("unknown.csv"), "# Moist grass.\n" + with);
+  const auto report = [&](const std::string& name) {
+    const ProcessResult bench = run_emit({"bench", "nature", folder.file(name), "--material",
+                                          "lawn", "--json", folder.file("n.json")},
+                                         std::chrono::seconds(120));
+    EXPECT_EQ(bench.exit_code, 0) << bench.err;
+    return read_text(folder.file("n.json"));
+  };
+  const std::string known = report("moist.csv");
+  const std::string unknown = report("unknown.csv");
+  EXPECT_THAT(known, HasSubstr("\"dry_layers_hold\": true"));
+  EXPECT_THAT(known, HasSubstr("evaporation: humidity of the record"));
+  EXPECT_THAT(known, HasSubstr("which is not measured"));
+  EXPECT_THAT(unknown, HasSubstr("\"dry_layers_hold\": false"));
+  EXPECT_THAT(unknown, HasSubstr("the record has no humidity"));
+  // Evaporation cools the mean of the day by kelvins, in the reference and in the real-time model.
+  const auto bias = [](const std::string& json, const std::string& part) {
+    return json_numbers(json.substr(json.find("\"" + part + "\"")), "bias_k").front();
+  };
+  EXPECT_LT(bias(known, "nothing_fitted"), bias(unknown, "nothing_fitted") - 2.0);
+  EXPECT_NEAR(bias(known, "nothing_fitted_real_time"), bias(known, "nothing_fitted"), 0.3);
+}
+
 TEST(CliBenchNature, names_what_it_cannot_read) {
   const TemporaryFolder folder;
   EXPECT_EQ(run_emit({"bench", "nature"}).exit_code, 2);

@@ -128,7 +128,7 @@ struct FosterDrive {
   Real absorbed_w_m2 = 0;  ///< A: absorbed short-wave and long-wave flux
   Real film_w_m2_k = 0;    ///< h
   Real air_offset_k = 0;
-  // Exchange of water with the air (evaporation.hpp). All are 0 for a dry surface.
+  // Exchange of water with the air (evaporation.hpp). Both k are 0 for a dry surface.
   Real evaporation_w_m2_pa = 0;  ///< k where e_s(T) is above e_a
   Real dew_w_m2_pa = 0;          ///< k where it is below
   Real vapour_pa = 0;            ///< e_a

@@ -36,6 +36,9 @@ inline constexpr Interval kWindMS{0.0, 100.0};
 inline constexpr Interval kCloudFrac{0.0, 1.0};
 inline constexpr Interval kEnvironmentK{100.0, 400.0};
 inline constexpr Interval kFilmWM2K{0.0, 1000.0};
+inline constexpr Interval kWindFromDeg{0.0, 360.0};
+inline constexpr Interval kHumidityFrac{0.0, 1.0};
+inline constexpr Interval kRainMmH{0.0, 500.0};
 
 // Parts of entities that heat themselves, of scenarios and of host frames.
 inline constexpr Interval kPartK{50.0, 3000.0};

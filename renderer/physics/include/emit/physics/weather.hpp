@@ -27,6 +27,8 @@ struct WeatherSample {
   std::optional<double> wind_from_rad = std::nullopt;
   /// Relative humidity over water, 0..1. If absent, with_vapour() says what counts.
   std::optional<double> relative_humidity_frac = std::nullopt;
+  /// Rain, see climate/rain.hpp.
+  double rain_mm_h = 0.0;
 };
 
 /// Parameters of the clear-sky models.

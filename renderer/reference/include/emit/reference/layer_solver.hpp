@@ -33,10 +33,12 @@ struct FaceMoisture {
   double pressure_pa = 101'325.0;
   double wetness_frac = 1.0;    ///< share of the evaporation of a face that is moist all over
   double resistance_s_m = 0.0;  ///< of the surface, under the light of that instant
+  double film_frac =
+      0.0;  ///< share that rain has wetted, without that resistance; the rest is as above
 
   /// Returns the latent heat that leaves the face, W m-2, without any linearisation: the mass of
   /// water through both resistances times its heat of vaporisation. Dew forms on the whole face,
-  /// without its resistance. @pre film_w_m2_k > 0 and air_k > 0
+  /// without its resistance, unless the face is dry. @pre film_w_m2_k > 0 and air_k > 0
   [[nodiscard]] double latent_w_m2(double face_k, double air_k, double film_w_m2_k) const noexcept;
 };
 /// Returns the saturation pressure of water vapour, Pa: over water by Wagner and Pruss (1993), over

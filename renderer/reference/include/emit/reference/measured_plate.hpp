@@ -7,6 +7,7 @@
 
 #include "emit/physics/air_film.hpp"
 #include "emit/physics/error.hpp"
+#include "emit/physics/evaporation.hpp"
 #include "emit/scene/scene_desc.hpp"
 
 /// Level, open ground under measured weather, and fits of its properties to a measured surface
@@ -23,6 +24,7 @@ struct LoggerRow {
   double wind_m_s = 0.0;     ///< 10 m above the ground, >= 0
   double film_w_m2_k = 0.0;  ///< stated film of the air; 0: from wind and temperatures
   double surface_k = 0.0;    ///< measured; fit_plate() alone reads it
+  double vapour_pa = 0.0;    ///< of the air; counts where the ground is moist
 };
 
 /// Properties of the ground that a logger can show.
@@ -39,6 +41,7 @@ struct PlateSetup {
   std::vector<scene::Layer> layers;  ///< outermost first
   double roughness = 1.52;           ///< factor of scene::roughness_factor()
   double height_m = 0.0;             ///< of the place above the sea; sets the air's density
+  physics::MoistSurface moisture;    ///< exchange of water with the air; dry unless stated
   /// Number of times that the first day is repeated before the record. The profile begins steady
   /// between the mean of the air and the base.
   std::uint32_t spin_up_days = 5;

@@ -37,6 +37,8 @@ struct ClimateNode {
   physics::AirFlow flow = {};  ///< past what stands still
   double surroundings_k = 0.0;
   double vapour_pa = 0.0;  ///< of the air
+  double rain_mm = 0.0;    ///< depth since some instant
+  double wet_frac = 0.0;   ///< share of level ground that rain has wetted; that of a material
 };
 
 /// Options of SurfaceClimate::create().
@@ -97,6 +99,7 @@ struct SurfaceOptics {
   double roughness = 1.0;   ///< factor of the forced part of the film
   bool both_sides = false;  ///< the film is the mean of both faces of a sheet
   physics::MoistSurface moisture = {};
+  bool holds_water = false;  ///< rain wets it
 };
 /// Returns the resistance of a moist surface under a short-wave irradiance, s m-1: its inverse goes
 /// linearly from that of the night to that of the day, which counts from 100 W/m2 on.
@@ -158,6 +161,7 @@ class PointSolver {
   bool has_spin_up_ = false;
   glm::dvec3 spin_up_normal_{0.0};
   std::vector<double> spin_up_k_;  ///< temperature of every node at the start of the history
+  std::vector<double> wet_frac_;   ///< of level ground at the nodes of the climate; empty: dry
   std::vector<ProfilePoint> start_profile_;
 };
 

@@ -11,6 +11,7 @@
 #include "emit/physics/air_film.hpp"
 #include "emit/physics/air_model.hpp"
 #include "emit/physics/atmosphere_table.hpp"
+#include "emit/physics/climate/surface_water.hpp"
 #include "emit/physics/evaporation.hpp"
 #include "emit/physics/frames.hpp"
 #include "emit/physics/weather.hpp"
@@ -148,6 +149,9 @@ struct Material {
   std::optional<double> surface_resistance_s_m;  ///< in sunlight; absent: 0
   std::optional<double> night_resistance_s_m;    ///< absent: the same as in sunlight
   std::optional<Gloss> gloss;  ///< absent: the surface emits and reflects evenly to all sides
+  // foster: rain water (physics.md eq. 61 to 64).
+  std::optional<double> water_store_mm;         ///< what it holds; absent: rain leaves it as it is
+  std::optional<double> readily_evaporable_mm;  ///< of the top layer of a soil; absent: no soil
   /// Temperature of a hot part or another emitter that takes no part in the thermal simulation.
   std::optional<double> prescribed_k;
   /// True for both faces of a thin body, whose layers are half of it over an insulated middle (see
@@ -176,10 +180,25 @@ struct Material {
 [[nodiscard]] inline physics::MoistSurface moisture_of(const Material& material) noexcept {
   const bool stated = material.wetness_frac || material.surface_resistance_s_m;
   if (!stated || material.prescribed_k) return {};
+  // The store decides about the wetness of soil.
+  if (material.water_store_mm && material.readily_evaporable_mm) return {};
   const double resistance_s_m = material.surface_resistance_s_m.value_or(0.0);
   return {.wetness_frac = material.wetness_frac.value_or(1.0),
           .resistance_s_m = resistance_s_m,
           .night_resistance_s_m = material.night_resistance_s_m.value_or(resistance_s_m)};
+}
+
+/// Returns the room for rain water of a material; none if it states none or has a prescribed
+/// temperature. Soil starts as wet as `wetness_frac`, everything else dry.
+[[nodiscard]] inline physics::WaterStore water_store_of(const Material& material) noexcept {
+  if (!material.water_store_mm || material.prescribed_k) return {};
+  physics::WaterStore out{.capacity_mm = *material.water_store_mm};
+  if (material.readily_evaporable_mm) {
+    out.kind = physics::WaterStore::Kind::soil;
+    out.ready_mm = *material.readily_evaporable_mm;
+    out.initial_mm = physics::soil_water_mm(out, material.wetness_frac.value_or(0.0));
+  }
+  return out;
 }
 
 /// One node of a trajectory: linear in position, slerp in attitude; `on` holds until the next one.

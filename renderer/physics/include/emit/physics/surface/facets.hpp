@@ -6,7 +6,7 @@
 #include <cstdint>
 
 /// Rough surfaces as mirrors of many slopes: their emission by angle and the lobe that they reflect
-/// (physics.md eq. 61 to 65). Any thread. Real time: make_lobe() is setup only.
+/// (physics.md eq. 71 to 75). Any thread. Real time: make_lobe() is setup only.
 namespace emit::physics {
 
 /// Distribution of the slopes of the facets, the same in all directions along the surface.
@@ -94,7 +94,7 @@ struct Lobe {
 [[nodiscard]] Lobe make_lobe(const Facets& facets, const FacetOptics& optics);
 
 /// Returns the radiance of the lobe per irradiance of the sun across its direction, sr-1, without
-/// the reflectance of the facets (physics.md eq. 64). The cosines are those to the surface's
+/// the reflectance of the facets (physics.md eq. 74). The cosines are those to the surface's
 /// normal of viewer, sun and half-way direction, then that between half-way direction and viewer.
 /// `disc_rad` is the radius of the sun's disc, over which the facets spread the light.
 struct GlintAngles {

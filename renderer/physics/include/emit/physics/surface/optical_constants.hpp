@@ -7,7 +7,7 @@
 #include "emit/physics/error.hpp"
 #include "emit/physics/planck.hpp"
 
-/// Reflectance of smooth surfaces from their complex refractive index (physics.md eq. 60). Any
+/// Reflectance of smooth surfaces from their complex refractive index (physics.md eq. 70). Any
 /// thread; setup only.
 namespace emit::physics {
 
@@ -38,7 +38,7 @@ enum class IndexTable : std::uint8_t {
 [[nodiscard]] OpticalConstants constants_at(std::span<const OpticalConstants> table,
                                             double wavelength_um) noexcept;
 
-/// Returns the share of unpolarised light that a smooth surface reflects, 0..1 (physics.md eq. 60).
+/// Returns the share of unpolarised light that a smooth surface reflects, 0..1 (physics.md eq. 70).
 /// `cosine` is that of the angle of incidence, 0..1.
 [[nodiscard]] double fresnel_reflectance_frac(double refractive_index, double extinction_index,
                                               double cosine) noexcept;

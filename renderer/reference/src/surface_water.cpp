@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emit/reference/surface_water.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "emit/physics/constants.hpp"
+
+namespace emit::reference {
+namespace {
+
+using physics::WaterStore;
+
+/// Share of the evaporation of ground that is wet all over, from the depth that is gone.
+double wetness(const WaterStore& store, double water_mm) noexcept {
+  if (!(water_mm > 0.0)) return 0.0;
+  if (store.kind == WaterStore::Kind::film) {
+    return std::pow(std::min(1.0, water_mm / store.capacity_mm), 2.0 / 3.0);
+  }
+  const double gone_mm = store.capacity_mm - water_mm;
+  if (gone_mm <= store.ready_mm) return 1.0;
+  return (store.capacity_mm - gone_mm) / (store.capacity_mm - store.ready_mm);
+}
+
+/// Resistance of the soil over that of its air film, for which the equation of Penman and Monteith
+/// gives its share of the evaporation of wet soil: (1 + slope/gamma) (1/share - 1).
+double soil_resistance(const WaterStore& store, double share, const ClimateNode& node) noexcept {
+  if (store.kind != WaterStore::Kind::soil) return 0.0;
+  constexpr double kDifferenceK = 0.05;
+  const double slope_pa_k =
+      (saturation_pa(node.air_k + kDifferenceK) - saturation_pa(node.air_k - kDifferenceK)) /
+      (2.0 * kDifferenceK);
+  const double latent_j_kg = 2.501e6 - 2361.0 * (node.air_k - physics::kZeroCelsiusK);
+  const double gamma_pa_k = 1013.0 * node.flow.pressure_pa / (0.622 * latent_j_kg);
+  return (1.0 + slope_pa_k / gamma_pa_k) * (1.0 / share - 1.0);
+}
+
+/// Share of what ground of the same temperature would give that is wet all over.
+double warm_share(const WaterStore& store, double water_mm, const ClimateNode& node) noexcept {
+  const double share = wetness(store, water_mm);
+  if (!(share > 0.0)) return 0.0;
+  return store.kind == WaterStore::Kind::film ? share
+                                              : 1.0 / (1.0 + soil_resistance(store, share, node));
+}
+
+/// Water after a stretch in small steps of second order (Heun's), never below 0 or above the store.
+double later_mm(const WaterStore& store, double water_mm, double rain_mm_s, double begin_mm_s,
+                double end_mm_s, double dt_s, const ClimateNode& node) noexcept {
+  constexpr double kStepS = 1.0;
+  const auto steps = static_cast<int>(std::max(1.0, std::ceil(dt_s / kStepS)));
+  const double h = dt_s / steps;
+  const auto rate = [&](double mm, double frac) {
+    const double open_mm_s = begin_mm_s + frac * (end_mm_s - begin_mm_s);
+    // Dew forms on what is wet.
+    const double share = open_mm_s > 0.0 ? warm_share(store, mm, node) : (mm > 0.0 ? 1.0 : 0.0);
+    return rain_mm_s - share * open_mm_s;
+  };
+  double mm = water_mm;
+  for (int i = 0; i < steps; ++i) {
+    const double from = static_cast<double>(i) / steps;
+    const double to = static_cast<double>(i + 1) / steps;
+    const double slope = rate(mm, from);
+    const double next = std::clamp(mm + h * slope, 0.0, store.capacity_mm);
+    mm = std::clamp(mm + 0.5 * h * (slope + rate(next, to)), 0.0, store.capacity_mm);
+  }
+  return mm;
+}
+
+}  // namespace
+
+WaterCourse water_course(std::span<const ClimateNode> nodes, const scene::Material& material,
+                         double initial_k, double surroundings_reflectance_frac,
+                         const LayerMesh& mesh, const StepOptions& steps) {
+  const WaterStore store = scene::water_store_of(material);
+  WaterCourse out;
+  const double rain_mm = nodes.back().rain_mm - nodes.front().rain_mm;
+  if (store.none() || !(rain_mm > 0.0 || store.initial_mm > 0.0)) return out;
+  const SurfaceOptics surface{{0.0, 0.0, 1.0},
+                              material.solar_absorptance_frac,
+                              material.emissivity_frac,
+                              scene::roughness_factor(material.roughness),
+                              false,
+                              scene::moisture_of(material),
+                              true};
+  const ViewSample open = open_view(surface.normal);
+  LayerSolver solver(mesh, steps);
+  solver.start(steady_profile(solid_layers(material.layers), initial_k,
+                              material.sheet ? initial_k : material.base_k),
+               0.0);
+  const auto face_at = [&](ClimateNode node, double wet_frac) {
+    node.wet_frac = wet_frac;
+    return face_state(node, surface, open, surroundings_reflectance_frac);
+  };
+  const auto open_mm_s = [&](const ClimateNode& node) {
+    const FaceState face = face_at(node, 1.0);
+    const double k = solver.face_k();
+    const double latent_j_kg = 2.501e6 - 2361.0 * (node.air_k - physics::kZeroCelsiusK);
+    return face.moisture->latent_w_m2(k, face.air_k, face.film_at_w_m2_k(k)) / latent_j_kg;
+  };
+  double water_mm = store.initial_mm;
+  const auto keep = [&](const ClimateNode& node) {
+    out.time_ns.push_back(node.time_ns);
+    out.water_mm.push_back(water_mm);
+    out.wet_frac.push_back(warm_share(store, water_mm, node));
+    out.face_k.push_back(solver.face_k());
+  };
+  keep(nodes.front());
+  for (std::size_t i = 0; i + 1 < nodes.size(); ++i) {
+    const ClimateNode& a = nodes[i];
+    const ClimateNode& b = nodes[i + 1];
+    const double dt_s = static_cast<double>(b.time_ns - a.time_ns) * 1e-9;
+    if (dt_s > 0.0) {
+      const double rain_mm_s = (b.rain_mm - a.rain_mm) / dt_s;
+      const double begin_mm_s = open_mm_s(a);
+      const double expected_mm =
+          later_mm(store, water_mm, rain_mm_s, begin_mm_s, begin_mm_s, dt_s, a);
+      const double end_s = static_cast<double>(b.time_ns - nodes.front().time_ns) * 1e-9;
+      solver.advance({solver.time_s(), end_s, face_at(a, warm_share(store, water_mm, a)),
+                      face_at(b, warm_share(store, expected_mm, b))},
+                     surface.emissivity_frac);
+      const double before_mm = water_mm;
+      water_mm = later_mm(store, water_mm, rain_mm_s, begin_mm_s, open_mm_s(b), dt_s, b);
+      out.lost_mm += b.rain_mm - a.rain_mm - (water_mm - before_mm);
+    }
+    keep(b);
+  }
+  return out;
+}
+
+double WaterCourse::at(std::int64_t at_ns) const noexcept {
+  if (time_ns.empty()) return 0.0;
+  const auto after = std::upper_bound(time_ns.begin(), time_ns.end(), at_ns);
+  if (after == time_ns.begin()) return wet_frac.front();
+  if (after == time_ns.end()) return wet_frac.back();
+  const auto i = static_cast<std::size_t>(after - time_ns.begin());
+  const double f = static_cast<double>(at_ns - time_ns[i - 1]) /
+                   static_cast<double>(time_ns[i] - time_ns[i - 1]);
+  return wet_frac[i - 1] + f * (wet_frac[i] - wet_frac[i - 1]);
+}
+
+}  // namespace emit::reference
