@@ -57,9 +57,6 @@ FILES = {
         "gas": (
             "Frame time of the scenario `decoys` with each kind of gas, beside the same scene without gas.",
             "emit bench gas"),
-        "clutter": (
-            "Frame time and warm-up of the airfield with materials that vary from place to place, beside even ones.",
-            "emit bench clutter"),
         "crowd": (
             "The airfield alone and with ten thousand figures of a thousand triangles each.",
             "emit bench crowd"),

@@ -34,7 +34,7 @@ struct LightCommand {
   std::uint32_t first_record = 0;
   std::uint32_t count = 0;
 };
-/// How draws of a material use the field of its clutter.
+/// The type says how draws of a material use the field of its clutter.
 struct DrawnClutter {
   std::uint32_t field = 0;  ///< 1 + number of the field; 0: the material does not vary
   double tiles_per_m = 0.0;

@@ -383,7 +383,7 @@ void CachedStage::bind() const noexcept {
                                static_cast<std::uint32_t>(lights_->bands()));
   }
   if (!clutter_.empty()) {
-    // Without twins nothing is added to the sample's own temperature.
+    // Read the sample itself where there are no twins: then nothing is added to its temperature.
     const std::size_t drawn = surface_->model().drawn_samples;
     const bool twins = surface_->vertices(0).size() > drawn;
     drawn_->vertices.read_twins(node_buffers_[surface_->storage(0)],

@@ -25,7 +25,7 @@ class ClutterFields {
   [[nodiscard]] bool empty() const noexcept { return texture_.id() == 0; }
   /// True if the emissivity of some material varies.
   [[nodiscard]] bool change_emissivity() const noexcept { return emissivity_; }
-  /// How draws of each material use the fields.
+  /// Returns by material how its draws use the fields.
   [[nodiscard]] std::span<const DrawnClutter> of_materials() const noexcept { return drawn_; }
   void bind() const noexcept { texture_.bind(EMIT_TEX_CLUTTER); }
 

@@ -79,7 +79,7 @@ TEST_F(ConfigTest, weather_report_of_an_epw_says_what_was_read) {
 }
 
 TEST_F(ConfigTest, weather_report_holds_the_beam_against_the_height_of_the_sun) {
-  // At 40 N on 21 December the sun is up from 7:20 to 16:40. Of ten hours of beam, the one that
+  // The sun is up at 40 N on 21 December from 7:20 to 16:40. Of ten hours of beam, the one that
   // ends at 24 has none, and those that end at 8 and 17 have a part of it.
   EpwText file;
   file.add_day(1991, 12, 21, 400.0, 8, 17);

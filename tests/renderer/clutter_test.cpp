@@ -238,8 +238,7 @@ TEST(Clutter, PixelsAverageRadianceAndNotTemperature) {
   EXPECT_GT(near_variance_k2, 4.0);
   EXPECT_NEAR(mean(far.variance_k2), near_variance_k2, 0.15 * near_variance_k2);
   EXPECT_NEAR(mean(far.kelvin), near_k, 0.1);
-  // Of a kelvin squared of variance the mean of radiance is 2.3e-4 above that of the mean
-  // temperature (L'' / 2 L at 310 K in 8 to 12 um about 1.1e-4 each).
+  // A kelvin squared of variance raises the mean radiance by L'' / 2 L, some 1.1e-4 in 8 to 12 um.
   const double of_mean_k = radiance(near_k);
   const double excess = near_w_m2_sr / of_mean_k;
   const double far_excess = mean(far.radiance_w_m2_sr) / radiance(mean(far.kelvin));

@@ -27,7 +27,7 @@ layout(location = 3) out uvec4 clutter;
 layout(location = 2) out uvec4 clutter;
 #endif
 
-// What passes/clutter.glsl needs of the pixel: place in the field, slopes of the temperature, and the footprint.
+// Packs place in the field, slopes of the temperature and footprint of the pixel for passes/clutter.glsl.
 uvec4 packed_clutter() {
   // Take the plane that the triangle faces most.
   vec3 across = dFdx(tile_position) * float(EMIT_CLUTTER_SIDE);

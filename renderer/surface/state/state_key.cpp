@@ -92,7 +92,7 @@ void add_material(Fnv64& hash, const scene::Material& material) {
   add_optional(hash, material.prescribed_k);
   const physics::MoistSurface moisture = scene::moisture_of(material);
   add(hash, moisture.wetness_frac, moisture.resistance_s_m, moisture.night_resistance_s_m);
-  // What the field looks like does not matter to the twins.
+  // The twins do not depend on the looks of the field.
   add(hash, scene::varies_in_heat(material));
   if (scene::varies_in_heat(material)) {
     add(hash, material.clutter->solar_absorptance_sd_frac, material.clutter->emissivity_sd_frac,

@@ -266,7 +266,7 @@ class Sweeper {
   std::size_t intervals_;
   std::vector<std::uint32_t> swept_;  ///< samples that change; one for both faces of a sheet
   std::vector<SentRow> rows_;         ///< by sample: what it sent in the latest pass
-  /// By entry of `swept_`: 1 + island of its column, or 0; kTwins for twins, which come last.
+  /// Kinds by entry of `swept_`: 1 + island of its column, or 0; kTwins for twins, which come last.
   std::vector<std::uint32_t> kinds_;
   std::vector<float> sent_;           ///< by sample: its row in the window at hand
   std::vector<float> shift_w_m2_;     ///< by sample: long wave at the last node above its guess

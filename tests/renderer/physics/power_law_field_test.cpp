@@ -78,7 +78,7 @@ TEST(PowerLawField, LevelsKeepTheLongWavesAndLeaveTheShortOnesOut) {
     variance /= static_cast<double>(level.values.size());
     EXPECT_NEAR(variance, level.variance, 1e-5 + 1e-3 * level.variance) << l;
     EXPECT_LT(level.variance, levels[l - 1].variance);
-    // From 0.05 to 0.3 waves per texel less and less is kept.
+    // Less and less is kept from 0.05 to 0.3 waves per texel.
     for (const auto& [x, y] : {std::pair{4, 1}, {0, 5}, {-3, 3}, {7, 2}, {12, 0}}) {
       const double turns_per_texel = std::hypot(x, y) / static_cast<double>(level.side);
       if (2 * std::max(std::abs(x), std::abs(y)) >= static_cast<int>(level.side)) continue;
