@@ -13,7 +13,8 @@
 /// Thread: any.  Real time: setup only.
 namespace emit::renderer {
 
-/// Magnitude of the clutter's field at which twins of a material are solved, in standard deviations.
+/// Magnitude of the clutter's field at which twins of a material are solved, in standard
+/// deviations.
 inline constexpr double kTwinSd = 1.5;
 
 /// Returns a material with clutter as it is where the field has the value `sd` (physics.md eq. 56).

@@ -813,9 +813,8 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
                                            .clutter = !clutter->empty()};
   auto geometry_pass = GeometryPass::create(*context, geometry_setup);
   if (!geometry_pass) return tl::unexpected(std::move(geometry_pass.error()));
-  auto radiance_pass =
-      RadiancePass::create(scenario.thermal, radiance_content(*bands, *clutter, output),
-                           context->software());
+  auto radiance_pass = RadiancePass::create(
+      scenario.thermal, radiance_content(*bands, *clutter, output), context->software());
   if (!radiance_pass) return tl::unexpected(std::move(radiance_pass.error()));
   FramePasses passes{std::move(*geometry_pass), std::move(*radiance_pass), {}, {}, {}};
   std::optional<GasModel> gas;

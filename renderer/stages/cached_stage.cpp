@@ -164,8 +164,8 @@ CachedStage::CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb&
                          std::vector<Eye> detail_eyes, std::unique_ptr<CachedSurface> surface,
                          std::vector<FosterMaterial> foster_materials, const SceneHistory& history,
                          const BandLights* lights, std::span<const DrawnClutter> clutter,
-                         std::optional<SavedSurface> saved, bool visibly_simplified, std::optional<ShadePass> shade_pass,
-                         bool software)
+                         std::optional<SavedSurface> saved, bool visibly_simplified,
+                         std::optional<ShadePass> shade_pass, bool software)
     : sensor_(scenario.sensor),
       max_samples_(scenario.thermal.max_samples),
       software_(software),

@@ -39,8 +39,8 @@ void place(std::span<const physics::FieldLevel> levels, std::span<Texel> out) {
     const std::size_t pair = l / 2;
     const std::size_t first_x = l % 2 == 0 ? 0 : kSide >> pair;
     const std::size_t first_y = 2 * kSide - (2 * kSide >> pair);
-    const auto lost = static_cast<std::uint32_t>(
-        std::lround(255.0 * std::clamp(1.0 - level.variance, 0.0, 1.0)));
+    const auto lost =
+        static_cast<std::uint32_t>(std::lround(255.0 * std::clamp(1.0 - level.variance, 0.0, 1.0)));
     const auto steps = [&](std::size_t x, std::size_t y) {
       return steps_of(level.values[(y % level.side) * level.side + x % level.side]);
     };

@@ -519,6 +519,7 @@ void make_state_seeds() {
   static_cast<void>(model.meshes[0].split(std::vector<std::uint32_t>{0, 3}));
   model.drawn_samples = static_cast<std::uint32_t>(model.meshes[0].vertices().size());
   model.first_sample = {0};
+  model.samples.first_twin = model.drawn_samples;
   for (std::uint32_t i = 0; i < model.drawn_samples; ++i) {
     renderer::SurfaceSample sample;
     sample.material = i % 3;
@@ -526,6 +527,7 @@ void make_state_seeds() {
     sample.first_seen = i;
     sample.seen_count = 1;
     sample.seen_scale = 1.0F;
+    sample.vertex = i;
     model.samples.samples.push_back(sample);
     model.samples.seen.push_back({model.drawn_samples - 1 - i, 0.5F});
     model.states.emplace_back();

@@ -39,8 +39,8 @@ scene::Clutter both() {
 }
 
 scene::ScenarioDesc varied_ground(const scene::Clutter& clutter, double half_m = 40.0) {
-  scene::ScenarioDesc s = test::cached_scenario(
-      test::write_quads("varied", {test::ground(half_m, half_m)}));
+  scene::ScenarioDesc s =
+      test::cached_scenario(test::write_quads("varied", {test::ground(half_m, half_m)}));
   s.materials[0].clutter = clutter;
   s.sensor.fov_h_rad = 0.02;
   return s;
@@ -265,13 +265,12 @@ TEST(Clutter, MovesWithTheCameraWithoutTwinkling) {
       const Picture seen = eye.show(
           2 * kHourNs, {from_m, physics::world_from_body_heading_pitch_roll(0.0, -pitch, 0.0)});
       for (std::size_t x = 0; x < kWidth; ++x) {
-        fine[x * kShifts + static_cast<std::size_t>(shift)] =
-            seen.kelvin[kHeight / 2 * kWidth + x];
+        fine[x * kShifts + static_cast<std::size_t>(shift)] = seen.kelvin[kHeight / 2 * kWidth + x];
       }
     }
     // The contrast is that of a picture from near by.
-    const double contrast_k = rms_about_mean(
-        eye.show(2 * kHourNs, from_above(0.0, 0.0, 500.0)).shift_k);
+    const double contrast_k =
+        rms_about_mean(eye.show(2 * kHourNs, from_above(0.0, 0.0, 500.0)).shift_k);
     EXPECT_GT(contrast_k, 0.3);
     // Window the row, and take its power above one wave per pixel.
     const std::size_t n = fine.size();
@@ -281,7 +280,8 @@ TEST(Clutter, MovesWithTheCameraWithoutTwinkling) {
     for (std::size_t k = kWidth; k < n / 2; ++k) {
       std::complex<double> sum = 0.0;
       for (std::size_t i = 0; i < n; ++i) {
-        const double turn = 2.0 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(n);
+        const double turn =
+            2.0 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(n);
         const double window = 0.5 - 0.5 * std::cos(turn);
         sum += window * (fine[i] - middle) * std::polar(1.0, -turn * static_cast<double>(k));
       }

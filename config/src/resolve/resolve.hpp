@@ -62,8 +62,9 @@ void check_material_name(const std::string& name, const std::vector<scene::Mater
 [[nodiscard]] std::vector<scene::ContactDesc> resolve_contacts(
     const Node& root, const std::vector<scene::ObjectDesc>& objects,
     const std::vector<scene::Material>& materials, Diagnostics& diagnostics);
-/// Reads the variation of materials into `materials`. Reports materials and bands that do not exist,
-/// wavelengths that do not fit each other, and changes that lead out of the range of a material.
+/// Reads the variation of materials into `materials`. Reports materials and bands that do not
+/// exist, wavelengths that do not fit each other, and changes that lead out of the range of a
+/// material.
 void resolve_clutter(const Node& root, const scene::ThermalOptions& thermal,
                      const std::vector<std::string>& known_bands,
                      std::vector<scene::Material>& materials, Diagnostics& diagnostics);

@@ -48,18 +48,18 @@ void check(const Node& node, const Clutter& clutter, const Material& material,
     const auto listed =
         std::ranges::find(clutter.band_emissivity_sd_frac, own.band, &scene::BandValue::band);
     const bool given = listed != clutter.band_emissivity_sd_frac.end();
-    check_share(node, given ? "band_emissivity_sd_frac" : "emissivity_sd_frac",
-                own.emissivity_frac, given ? listed->value : clutter.emissivity_sd_frac,
-                diagnostics);
+    check_share(node, given ? "band_emissivity_sd_frac" : "emissivity_sd_frac", own.emissivity_frac,
+                given ? listed->value : clutter.emissivity_sd_frac, diagnostics);
   }
   const bool shows = std::ranges::any_of(clutter.band_emissivity_sd_frac,
                                          [](const auto& entry) { return entry.value != 0.0; });
   if (!clutter.changes_heat() && !shows) {
-    diagnostics.add(node.at, "[[clutter]] changes nothing: it has no '..._sd_frac' and no "
-                             "'inertia_sd_ln'");
+    diagnostics.add(node.at,
+                    "[[clutter]] changes nothing: it has no '..._sd_frac' and no "
+                    "'inertia_sd_ln'");
   }
-  if (material.prescribed_k && (clutter.solar_absorptance_sd_frac != 0.0 ||
-                                clutter.inertia_sd_ln != 0.0)) {
+  if (material.prescribed_k &&
+      (clutter.solar_absorptance_sd_frac != 0.0 || clutter.inertia_sd_ln != 0.0)) {
     diagnostics.add(node.at, fmt::format("material '{}' has a prescribed temperature: only its "
                                          "emissivity can vary",
                                          material.name));
@@ -69,8 +69,8 @@ void check(const Node& node, const Clutter& clutter, const Material& material,
 }  // namespace
 
 void resolve_clutter(const Node& root, const scene::ThermalOptions& thermal,
-                     const std::vector<std::string>& known_bands,
-                     std::vector<Material>& materials, Diagnostics& diagnostics) {
+                     const std::vector<std::string>& known_bands, std::vector<Material>& materials,
+                     Diagnostics& diagnostics) {
   std::vector<std::string> names;
   for (const Material& material : materials) names.push_back(material.name);
   for (const Node& node : section_array(root, "clutter", diagnostics)) {

@@ -75,7 +75,7 @@ struct SurfaceNode {
   /// Values of the drawn samples, for the device. Behind them come those of the low and of the high
   /// twins, if there are any: SurfaceSample::vertex says where a sample has its own.
   std::vector<SampleVertex> vertices;
-  ChangedRanges changes;               ///< ranges of `vertices` that have changed
+  ChangedRanges changes;  ///< ranges of `vertices` that have changed
   /// Radiance from other samples, by sample, then band (BandExchange). It is empty without bands.
   std::vector<float> seen_w_m2_sr;
   ChangedRanges seen_changes;  ///< ranges of samples with vertices that have changed there

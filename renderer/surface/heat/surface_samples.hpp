@@ -134,8 +134,7 @@ struct SampleTwins {
   std::uint32_t low = kNoSample;
   std::uint32_t high = kNoSample;
 };
-[[nodiscard]] inline SampleTwins twins_of(const SurfaceSamples& all,
-                                          std::uint32_t index) noexcept {
+[[nodiscard]] inline SampleTwins twins_of(const SurfaceSamples& all, std::uint32_t index) noexcept {
   const auto found = std::ranges::lower_bound(all.twinned, index);
   if (found == all.twinned.end() || *found != index) return {};
   const auto low = all.first_twin + static_cast<std::uint32_t>(found - all.twinned.begin());

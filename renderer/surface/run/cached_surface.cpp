@@ -113,9 +113,8 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   // Save the surface before the outputs of node 0 change.
   const bool made_anew = model_->drawn.empty();
   if (made_anew) {
-    model_->drawn =
-        make_drawn_meshes(geometry_.geometry(), *model_,
-                          std::span(nodes_[0].vertices).first(model_->drawn_samples));
+    model_->drawn = make_drawn_meshes(geometry_.geometry(), *model_,
+                                      std::span(nodes_[0].vertices).first(model_->drawn_samples));
     if (auto go_on = report(kLevelsFrac); !go_on) return go_on;
   }
   if (made->to_save) {
@@ -202,7 +201,8 @@ void CachedSurface::fill_first_vertices() {
   for (std::uint32_t i = 0; i < all.size(); ++i) {
     if (all[i].vertex == kNoSample) continue;
     const bool moves = geometry_.entities() != 0 && all[i].entity < 0;
-    first.vertices[all[i].vertex] = {first.outputs[i].offset_k, nodes_[moves ? 1 : 0].outputs[i].sun_frac};
+    first.vertices[all[i].vertex] = {first.outputs[i].offset_k,
+                                     nodes_[moves ? 1 : 0].outputs[i].sun_frac};
   }
 }
 

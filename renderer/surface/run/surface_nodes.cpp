@@ -68,7 +68,7 @@ void SurfaceNodes::cut(std::int64_t event_ns, std::int64_t end_ns, const LocalSt
       const SampleVertex from = first.vertices[vertex];
       SampleVertex& to = second.vertices[vertex];
       first.vertices[vertex] = {between(from.offset_k, to.offset_k, frac),
-                           between(from.sun_frac, to.sun_frac, frac)};
+                                between(from.sun_frac, to.sun_frac, frac)};
       to.offset_k = between(from.offset_k, to.offset_k, end_frac);
     }
   });

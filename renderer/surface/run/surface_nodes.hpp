@@ -21,8 +21,8 @@ namespace emit::renderer {
 class SurfaceNodes {
  public:
   /// Makes node 0 of these states, outputs and interiors of bodies, and takes memory for the
-  /// others. The first `drawn` samples of `all` are drawn. Samples see others in `bands` bands, from
-  /// 0 on. @pre states and outputs have equal sizes
+  /// others. The first `drawn` samples of `all` are drawn. Samples see others in `bands` bands,
+  /// from 0 on. @pre states and outputs have equal sizes
   void begin(std::vector<SampleState> states, std::vector<SampleOutput> outputs,
              const SurfaceSamples& all, std::uint32_t drawn, std::span<const double> body_k,
              std::size_t bands);

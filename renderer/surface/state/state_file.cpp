@@ -248,8 +248,8 @@ bool consistent(const SurfaceModel& model, const scene::SceneGeometry& geometry,
             all[s.other_side].other_side < count && &all[all[s.other_side].other_side] == &s);
   };
   const std::size_t materials =
-      geometry.materials.size() +
-      2 * static_cast<std::size_t>(std::ranges::count_if(geometry.materials, scene::varies_in_heat));
+      geometry.materials.size() + 2 * static_cast<std::size_t>(std::ranges::count_if(
+                                          geometry.materials, scene::varies_in_heat));
   const auto sample_fits = [&](const SurfaceSample& s) {
     return sides_fit(s) && s.material < materials && s.entity >= -1 &&
            s.entity < static_cast<std::int64_t>(entities) && s.body >= -1 &&

@@ -6,9 +6,9 @@
 namespace emit::renderer {
 
 /// Appends the twins of all samples whose material has twins: samples at the same place, with the
-/// same view and the same history of sun and sky, and with the properties that the clutter gives the
-/// material where its field is -kTwinSd and +kTwinSd. Their states are those at the start of the
-/// history. Setup only: it uses all cores.
+/// same view and the same history of sun and sky, and with the properties that the clutter gives
+/// the material where its field is -kTwinSd and +kTwinSd. Their states are those at the start of
+/// the history. Setup only: it uses all cores.
 /// @pre the samples have numbers, columns and histories
 void add_twins(const SurfaceInputs& inputs, SampleHistories& histories, SurfaceModel& model);
 

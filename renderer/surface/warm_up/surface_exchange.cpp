@@ -268,9 +268,9 @@ class Sweeper {
   std::vector<SentRow> rows_;         ///< by sample: what it sent in the latest pass
   /// Kinds by entry of `swept_`: 1 + island of its column, or 0; kTwins for twins, which come last.
   std::vector<std::uint32_t> kinds_;
-  std::vector<float> sent_;           ///< by sample: its row in the window at hand
-  std::vector<float> shift_w_m2_;     ///< by sample: long wave at the last node above its guess
-  std::vector<SampleState> begin_;    ///< by sample: state at the begin of the window
+  std::vector<float> sent_;         ///< by sample: its row in the window at hand
+  std::vector<float> shift_w_m2_;   ///< by sample: long wave at the last node above its guess
+  std::vector<SampleState> begin_;  ///< by sample: state at the begin of the window
   SeenRadiation seen_;
   EntityExitance exitance_;
   std::size_t entities_ = 0;         ///< entities whose faces count; 0 without exchange
@@ -829,8 +829,7 @@ void Sweeper::carry_twins(std::size_t group, const Window& window) {
     const std::uint32_t s = swept_[chosen.first + i];
     states[i].cells_k[0] = static_cast<float>(aside_of_k(all[s], window.count));
     model_.states[s] = states[i];
-    model_.outputs[s] =
-        in_.heat.output(all[s], fronts[i].normal, end, fronts[i].drive, states[i]);
+    model_.outputs[s] = in_.heat.output(all[s], fronts[i].normal, end, fronts[i].drive, states[i]);
     const std::uint32_t other = all[s].other_side;
     if (other == kNoSample) continue;
     model_.states[other] = states[i];

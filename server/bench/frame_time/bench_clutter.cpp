@@ -41,8 +41,9 @@ scene::Clutter usual_clutter() {
 /// Scenes with clutter: as the scenario has it, of all materials, and of their emissivity alone.
 std::vector<SceneVariant> variants_of(const scene::ScenarioDesc& loaded) {
   std::vector<SceneVariant> out;
-  const bool varies = std::ranges::any_of(
-      loaded.materials, [](const scene::Material& material) { return material.clutter.has_value(); });
+  const bool varies = std::ranges::any_of(loaded.materials, [](const scene::Material& material) {
+    return material.clutter.has_value();
+  });
   if (varies) out.push_back({"as in the scenario", loaded});
   for (const bool heat : {false, true}) {
     SceneVariant& variant =
@@ -74,11 +75,10 @@ int run(const ClutterOptions& command) {
   for (std::size_t i = 0; i < measured->times.size(); ++i) {
     const VariantTimes& times = measured->times[i];
     const std::string name = i == 0 ? "none" : variants[i - 1].name;
-    table.add({name, fmt::format("{:.2f}", times.frame_ms.median()),
-               fmt::format("{:.2f}", times.frame_ms.max()),
-               fmt::format("{:.3f}", times.pairs.ratio),
-               fmt::format("{:.3f}", times.pairs.self_spread),
-               fmt::format("{:.1f}", times.warm_up_s)});
+    table.add(
+        {name, fmt::format("{:.2f}", times.frame_ms.median()),
+         fmt::format("{:.2f}", times.frame_ms.max()), fmt::format("{:.3f}", times.pairs.ratio),
+         fmt::format("{:.3f}", times.pairs.self_spread), fmt::format("{:.1f}", times.warm_up_s)});
     Json json = Json::object();
     json.set("clutter", name).set("frames", times.frame_ms.count());
     json.set("frame_ms_median", times.frame_ms.median()).set("frame_ms_max", times.frame_ms.max());

@@ -139,8 +139,7 @@ Result<Explanation> explain(const ExplainOptions& command, scene::ScenarioDesc s
   constexpr double kSameK = 0.5;
   const double last_k = run.rows().back().temperature_k;
   const double clutter_k = found.surface ? found.surface->clutter_k : 0.0;
-  if (found.surface &&
-      !(std::abs(last_k + clutter_k - found.surface->temperature_k) <= kSameK)) {
+  if (found.surface && !(std::abs(last_k + clutter_k - found.surface->temperature_k) <= kSameK)) {
     warn(fmt::format(
         "the pixel lies beside an edge: it shows {:.3f} K, its history ends at {:.3f} K",
         found.surface->temperature_k, last_k));

@@ -96,9 +96,10 @@ std::string surface_sentence(const Explanation& found) {
   const std::string clutter =
       s.clutter_sd == 0.0
           ? ""
-          : fmt::format(" Of its temperature {:+.3f} K are clutter: the field of the material is "
-                        "{:+.2f} standard deviations here.",
-                        s.clutter_k, s.clutter_sd);
+          : fmt::format(
+                " Of its temperature {:+.3f} K are clutter: the field of the material is "
+                "{:+.2f} standard deviations here.",
+                s.clutter_k, s.clutter_sd);
   return fmt::format(
       "It shows object '{}', material '{}', {:.2f} m away at ({:.3f}, {:.3f}, {:.3f}) m, normal "
       "({:.3f}, {:.3f}, {:.3f}), {:.3f} K. The face sees {:.1f} % sky and takes {:.1f} % of the "

@@ -11,6 +11,7 @@
 #include <iterator>
 #include <string>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "renderer/surface/mesh/refined_mesh_support.hpp"
@@ -30,10 +31,13 @@ StateKey some_key() {
   return key;
 }
 
-/// An octahedron of which some leaves are halved, and samples without two equal members.
 /// Number of samples that have a column.
 constexpr std::uint32_t kColumns = 3;
 
+/// Sample that has twins.
+constexpr std::uint32_t kTwinned = 2;
+
+/// An octahedron of which some leaves are halved, and samples without two equal members.
 struct World {
   scene::SceneGeometry geometry;
   SurfaceModel model;
@@ -49,6 +53,8 @@ struct World {
     model.drawn_samples = static_cast<std::uint32_t>(model.meshes[0].vertices().size());
     const std::uint32_t count = model.drawn_samples + 2;
     model.first_sample = {0};
+    model.samples.twinned = {kTwinned};
+    model.samples.first_twin = model.drawn_samples;
     float next = 0.25F;
     const auto number = [&next] { return next += 0.5F; };
     for (std::uint32_t i = 0; i < count; ++i) {
@@ -69,6 +75,12 @@ struct World {
       sample.open_frac[2] = number();
       sample.open_before_frac[3] = number();
       sample.flat_m = number();
+      sample.vertex = i;
+      if (i >= model.drawn_samples) {
+        // The samples behind those of the vertices are the twins of one of them.
+        sample.twin_of = kTwinned;
+        sample.vertex = (1 + i - model.drawn_samples) * model.drawn_samples + kTwinned;
+      }
       if (i < kColumns) {
         sample.column = i;
         SampleColumn column;
@@ -190,6 +202,8 @@ TEST_F(StateFile, gives_back_what_was_written_and_leaves_nothing_beside_it) {
     EXPECT_EQ(a.seen_scale, b.seen_scale);
     EXPECT_EQ(a.flat_m, b.flat_m);
     EXPECT_EQ(a.column, b.column);
+    EXPECT_EQ(a.vertex, b.vertex);
+    EXPECT_EQ(a.twin_of, b.twin_of);
     EXPECT_EQ(got->states[i].modes_k, model.states[i].modes_k);
     EXPECT_EQ(got->states[i].cells_k, model.states[i].cells_k);
     EXPECT_EQ(got->states[i].alone_k, model.states[i].alone_k);
@@ -430,6 +444,25 @@ TEST_F(StateFile, samples_that_belong_to_something_else_are_refused) {
   samples[0].other_side = last;
   samples[last].other_side = 0;
   EXPECT_TRUE(refused());
+}
+
+TEST_F(StateFile, twins_that_stand_elsewhere_are_refused) {
+  SurfaceSamples& all = world_.model.samples;
+  const auto refused_with = [&](auto& value, std::uint32_t wrong) {
+    const auto right = std::exchange(value, wrong);
+    write();
+    const bool refused = !read();
+    value = right;
+    write();
+    EXPECT_TRUE(read());
+    return refused;
+  };
+  EXPECT_TRUE(refused_with(all.samples[0].vertex, 1));
+  EXPECT_TRUE(refused_with(all.samples[0].twin_of, 1));
+  EXPECT_TRUE(refused_with(all.samples.back().vertex, kTwinned));
+  EXPECT_TRUE(refused_with(all.samples.back().twin_of, 0));
+  EXPECT_TRUE(refused_with(all.twinned[0], world_.model.drawn_samples));
+  EXPECT_TRUE(refused_with(all.first_twin, 0));
 }
 
 TEST_F(StateFile, that_is_not_there_or_cannot_be_written_is_an_error_of_the_disk) {

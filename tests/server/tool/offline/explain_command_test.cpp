@@ -51,7 +51,8 @@ TEST(CliExplain, the_terms_add_up_to_the_pixel_through_air_of_every_kind_and_ove
       {"--set", "atmosphere.enabled=false"},
       {"--set", terms},
       {"--set",
-       "clutter=[{material=\"asphalt\",shortest_m=0.05,longest_m=1.5,solar_absorptance_sd_frac=0.02,"
+       "clutter=[{material=\"asphalt\",shortest_m=0.05,longest_m=1.5,solar_absorptance_sd_frac=0."
+       "02,"
        "emissivity_sd_frac=0.005}]"},
       {"--set", "thermal.method=\"per-frame\""}};
   for (std::size_t a = 0; a < airs.size(); ++a) {
