@@ -207,11 +207,6 @@ def gas_tables(rows):
                  ("ratio", field("ratio")), ("spread", field("self_ratio_spread"))], rows)
 
 
-def clutter_tables(rows):
-    yield table([("clutter", field("clutter")), ("frame, ms", field("frame_ms_median")), ("ratio", field("ratio")),
-                 ("spread", field("self_ratio_spread")), ("warm-up, s", field("warm_up_s"))], rows)
-
-
 def uncertainty_tables(rows):
     for row in rows:
         flat = [{"band": row["band"], **{k: i[k] for k in ("input", "range", "source")},
@@ -286,7 +281,7 @@ def isolation_tables(rows):
 
 
 TABLES = {"paper": paper_tables, "error-vs-time": error_tables, "thermal-truth": truth_tables,
-          "subpixel": subpixel_tables, "scaling": scaling_tables, "crowd": crowd_tables, "gas": gas_tables, "clutter": clutter_tables,
+          "subpixel": subpixel_tables, "scaling": scaling_tables, "crowd": crowd_tables, "gas": gas_tables,
           "uncertainty": uncertainty_tables, "turn": turn_tables,
           "budget": budget_tables, "live": live_tables, "stream": stream_tables, "isolation": isolation_tables}
 

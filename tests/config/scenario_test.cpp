@@ -670,6 +670,11 @@ TEST_F(ConfigTest, clutter_is_read_checked_and_printed) {
        "'band_emissivity_sd_frac': there is no band '8-13'"},
       {head + "inertia_sd_ln = 0.1\n" + head + "inertia_sd_ln = 0.2\n",
        "material 'concrete' has another [[clutter]] already"},
+      {"[[clutter]]\nmaterial = \"shiny\"\nemissivity_sd_frac = 0.001\n[[material]]\nname = "
+       "\"shiny\"\nsolar_absorptance_frac = 0.5\nemissivity_frac = 0.9\nprescribed_k = 300\ngloss "
+       "= "
+       "{ index = \"water\" }\n",
+       "material 'shiny' has 'gloss', which gives its emissivity: that cannot vary"},
       {head + "inertia_sd_ln = 0.1\n[thermal]\nmethod = \"per-frame\"\n",
        "[[clutter]] needs thermal.method"},
       {head + "inertia_sd_ln = 0.1\n[[object]]\nname = \"jet\"\nentity_id = 3\ngltf = "

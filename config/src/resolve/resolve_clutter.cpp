@@ -58,6 +58,11 @@ void check(const Node& node, const Clutter& clutter, const Material& material,
                     "[[clutter]] changes nothing: it has no '..._sd_frac' and no "
                     "'inertia_sd_ln'");
   }
+  if (material.gloss && (clutter.emissivity_sd_frac != 0.0 || shows)) {
+    diagnostics.add(node.at, fmt::format("material '{}' has 'gloss', which gives its emissivity: "
+                                         "that cannot vary",
+                                         material.name));
+  }
   if (material.prescribed_k &&
       (clutter.solar_absorptance_sd_frac != 0.0 || clutter.inertia_sd_ln != 0.0)) {
     diagnostics.add(node.at, fmt::format("material '{}' has a prescribed temperature: only its "

@@ -156,23 +156,28 @@ uvec4 air_table(uint band) {
   return uvec4(bands[band].air_table_first, bands[band].air_table_ranges, bands[band].air_table_elevations, 0u);
 }
 
+// Temperature of an even surface that emits as much as a pixel in a band does, K. Radiance is averaged over the pixel, not
+// temperature: to second order the mean is that of a warmer surface.
+float emitting_k(uint band, Seen seen) {
+#ifdef EMIT_CLUTTER
+  float per_k = 1.0 / max(seen.temperature_k, 1.0);
+  return seen.temperature_k + 0.5 * seen.clutter_variance_k2 * (bands[band].curvature_k * per_k - 2.0) * per_k;
+#else
+  return seen.temperature_k;
+#endif
+}
+
 // Band radiance that leaves the surface, W m-2 sr-1: x = emission and reflection of `incoming`, y = reflected
 // sunlight. Sets `clamped` where the temperature lies outside the table.
 vec2 leaving_w_m2_sr(uint band, Seen seen, float incoming, inout bool clamped) {
   vec4 lut = vec4(bands[band].lut_first_k, bands[band].lut_nodes_per_k, bands[band].lut_last_node,
                   float(band * frame.band_lut_nodes));
   float emissivity_frac = texelFetch(band_lut, int(frame.first_emissivity + seen.material * EMIT_BANDS + band)).r;
-  float emitting_k = seen.temperature_k;
 #ifdef EMIT_CLUTTER_EMISSIVITY
   emissivity_frac += seen.clutter_sd * texelFetch(band_lut, int(frame.first_emissivity_sd + seen.material * EMIT_BANDS +
                                                                 band)).r;
 #endif
-#ifdef EMIT_CLUTTER
-  // Radiance is averaged over the pixel, not temperature: to second order the mean is that of a warmer surface.
-  float per_k = 1.0 / max(emitting_k, 1.0);
-  emitting_k += 0.5 * seen.clutter_variance_k2 * (bands[band].curvature_k * per_k - 2.0) * per_k;
-#endif
-  float emitted = emissivity_frac * planck_lut_radiance_w_m2_sr(emitting_k, lut, clamped);
+  float emitted = emissivity_frac * planck_lut_radiance_w_m2_sr(emitting_k(band, seen), lut, clamped);
   // Add the diffuse reflection.
   float sunlight = bands[band].sun_irradiance_w_m2 / EMIT_PI * seen.sun_cosine;
   return vec2(emitted + (1.0 - emissivity_frac) * incoming, (1.0 - emissivity_frac) * sunlight);
@@ -193,12 +198,7 @@ LobePixel lobe_of(ivec2 px, Seen seen, bool surface) {
 vec2 glossy_leaving_w_m2_sr(uint band, Seen seen, LobePixel lobe, vec2 tilt, float incoming, inout bool clamped) {
   vec4 lut = vec4(bands[band].lut_first_k, bands[band].lut_nodes_per_k, bands[band].lut_last_node,
                   float(band * frame.band_lut_nodes));
-  float emitting_k = seen.temperature_k;
-#ifdef EMIT_CLUTTER
-  float per_k = 1.0 / max(emitting_k, 1.0);
-  emitting_k += 0.5 * seen.clutter_variance_k2 * (bands[band].curvature_k * per_k - 2.0) * per_k;
-#endif
-  float black = planck_lut_radiance_w_m2_sr(emitting_k, lut, clamped);
+  float black = planck_lut_radiance_w_m2_sr(emitting_k(band, seen), lut, clamped);
   return lobe_leaving_w_m2_sr(band, lobe, black, incoming, sky_at_tilt_w_m2_sr(band, tilt),
                               bands[band].surroundings_radiance_w_m2_sr, bands[band].sun_irradiance_w_m2);
 }
