@@ -242,7 +242,9 @@ TEST(Clutter, PixelsAverageRadianceAndNotTemperature) {
   const double of_mean_k = radiance(near_k);
   const double excess = near_w_m2_sr / of_mean_k;
   const double far_excess = mean(far.radiance_w_m2_sr) / radiance(mean(far.kelvin));
-  EXPECT_NEAR(far_excess, excess, 2e-4 + 0.2 * std::abs(excess - 1.0));
+  // Both share emissivity and reflection, so their difference is that of the averaging alone, which
+  // is 4e-4 at least.
+  EXPECT_NEAR(far_excess, excess, 1e-4);
 }
 
 TEST(Clutter, MovesWithTheCameraWithoutTwinkling) {
