@@ -15,9 +15,10 @@ const KeyTable<ClutterDraft>& clutter_keys() {
                            "them."),
       number<ClutterDraft>("longest_m", "m", between(0.01, 32000), EMIT_FIELD(clutter.longest_m),
                            "Longest wavelength: at most 32 times the shortest."),
-      number<ClutterDraft>("slope", "", between(0, 6), EMIT_FIELD(clutter.slope),
-                           "Power spectral density over the plane goes with k^-slope: 3 where correlation "
-                           "falls exponentially with distance, 2 for octaves of equal variance."),
+      number<ClutterDraft>(
+          "slope", "", between(0, 6), EMIT_FIELD(clutter.slope),
+          "Power spectral density over the plane goes with k^-slope: 3 where correlation "
+          "falls exponentially with distance, 2 for octaves of equal variance."),
       integer<ClutterDraft>("seed", "", 0, std::numeric_limits<std::uint32_t>::max(),
                             EMIT_FIELD(clutter.seed), "Another seed gives another field."),
       number<ClutterDraft>("solar_absorptance_sd_frac", "", between(-0.3, 0.3),
