@@ -132,6 +132,7 @@ std::optional<std::int64_t> PoseHistory::on_since_ns(std::int64_t sim_time_ns) c
 bool PoseHistory::append(std::int64_t sim_time_ns, const physics::Pose& pose, bool on,
                          bool teleport) noexcept {
   if (!live_.empty() && sim_time_ns < live_.back().sim_time_ns) return false;
+  forget();
   const scene::Keyframe next{
       .sim_time_ns = sim_time_ns, .pose = pose, .on = on, .teleport = teleport};
   if (live_.empty()) {
@@ -208,8 +209,14 @@ void PoseHistory::make_room() noexcept {
   live_.erase(write, half);
 }
 
+void PoseHistory::foresee(std::int64_t sim_time_ns, const physics::Pose& pose) noexcept {
+  if (live_.empty() || sim_time_ns <= live_.back().sim_time_ns) return;
+  foreseen_ = scene::Keyframe{.sim_time_ns = sim_time_ns, .pose = pose, .on = live_.back().on};
+}
+
 void PoseHistory::reset() noexcept {
   live_.clear();
+  forget();
   appearance_count_ = 0;
   dropped_ = 0;
   skipped_count_ = 0;
@@ -222,6 +229,14 @@ void PoseHistory::reset() noexcept {
 }
 
 TrajectoryState PoseHistory::at(std::int64_t sim_time_ns) const noexcept {
+  TrajectoryState state = recorded_at(sim_time_ns);
+  if (!foreseen_ || sim_time_ns <= live_.back().sim_time_ns) return state;
+  const double way_frac = fraction(live_.back().sim_time_ns, foreseen_->sim_time_ns, sim_time_ns);
+  state.pose = physics::interpolate(live_.back().pose, foreseen_->pose, std::min(1.0, way_frac));
+  return state;
+}
+
+TrajectoryState PoseHistory::recorded_at(std::int64_t sim_time_ns) const noexcept {
   if (!live_.empty() && sim_time_ns >= live_.front().sim_time_ns) {
     return trajectory_at(live_, sim_time_ns);
   }
@@ -229,7 +244,7 @@ TrajectoryState PoseHistory::at(std::int64_t sim_time_ns) const noexcept {
 }
 
 TrajectoryState PoseHistory::ahead(std::int64_t sim_time_ns) const noexcept {
-  TrajectoryState state = at(sim_time_ns);
+  TrajectoryState state = recorded_at(sim_time_ns);
   if (!moving_ || live_.size() < 2 || sim_time_ns <= live_.back().sim_time_ns) return state;
   const scene::Keyframe& before = live_[live_.size() - 2];
   const scene::Keyframe& last = live_.back();
@@ -247,12 +262,12 @@ PoseHistory::Known PoseHistory::known() const noexcept {
 TrajectoryState PoseHistory::as_known(const Known& then, std::int64_t sim_time_ns) const noexcept {
   if (!then.live) return trajectory_at(scripted_, sim_time_ns);
   if (sim_time_ns >= then.newest.sim_time_ns) return {then.newest.pose, then.newest.on};
-  return at(sim_time_ns);
+  return recorded_at(sim_time_ns);
 }
 
 bool PoseHistory::departs(const Known& then, std::int64_t sim_time_ns) const noexcept {
   if (live_.empty() && !then.live) return false;
-  const TrajectoryState now = at(sim_time_ns);
+  const TrajectoryState now = recorded_at(sim_time_ns);
   const TrajectoryState before = as_known(then, sim_time_ns);
   return now.on != before.on || (now.on && !close(now.pose, before.pose));
 }

@@ -39,10 +39,16 @@ class PoseHistory {
   /// and 1 mrad, at most one second apart while moving). Returns false, and ignores the pose, when
   /// its time is before the newest live pose.
   bool append(std::int64_t sim_time_ns, const physics::Pose& pose, bool on, bool teleport) noexcept;
+  /// Says where the entity will be at an instant after its newest live pose, until forget() or the
+  /// next pose. It is ignored before the first live pose, and for another instant.
+  void foresee(std::int64_t sim_time_ns, const physics::Pose& pose) noexcept;
+  /// Forgets what was foreseen.
+  void forget() noexcept { foreseen_.reset(); }
   /// Forgets the live poses.
   void reset() noexcept;
 
-  /// Returns the state of the entity at an instant.
+  /// Returns the state of the entity at an instant. Between its newest live pose and what is
+  /// foreseen it moves evenly.
   [[nodiscard]] TrajectoryState at(std::int64_t sim_time_ns) const noexcept;
   /// Returns the state at an instant like at(), but a moving entity continues straight for
   /// kMaxAheadNs after its newest live pose.
@@ -100,6 +106,8 @@ class PoseHistory {
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }
 
  private:
+  /// Returns the state at an instant, whatever is foreseen.
+  [[nodiscard]] TrajectoryState recorded_at(std::int64_t sim_time_ns) const noexcept;
   void note_event(std::int64_t sim_time_ns) noexcept;
   void note_appearance(std::int64_t sim_time_ns) noexcept;
   [[nodiscard]] bool replaces_last(const scene::Keyframe& next) noexcept;
@@ -110,6 +118,7 @@ class PoseHistory {
   physics::AirFilmBody film_body_;
   scene::Trajectory scripted_;
   scene::Trajectory live_;
+  std::optional<scene::Keyframe> foreseen_;
   std::vector<std::int64_t> events_ns_;
   // State of the detection of starts and stops. A live entity starts when it leaves the place where
   // it rested, and stops when it has stayed in one place for a while. Jitter of the host is

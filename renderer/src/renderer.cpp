@@ -139,6 +139,8 @@ class GlRenderer final : public Renderer {
 
   std::size_t apply_entities(std::int64_t sim_time_ns,
                              std::span<const EntityUpdate> updates) noexcept override;
+  void foresee_entities(std::int64_t sim_time_ns,
+                        std::span<const EntityUpdate> updates) noexcept override;
   bool apply_part(std::int64_t sim_time_ns, const PartUpdate& update) noexcept override;
   bool apply_weather(const scene::WeatherSample& sample) noexcept override {
     return history_.environment.append(sample);
@@ -396,6 +398,7 @@ int GlRenderer::find_entity(std::uint32_t entity_id) const noexcept {
 
 std::size_t GlRenderer::apply_entities(std::int64_t sim_time_ns,
                                        std::span<const EntityUpdate> updates) noexcept {
+  for (PoseHistory& history : history_.entities) history.forget();
   std::size_t applied = 0;
   for (const EntityUpdate& update : updates) {
     const int index = find_entity(update.entity_id);
@@ -406,6 +409,15 @@ std::size_t GlRenderer::apply_entities(std::int64_t sim_time_ns,
     }
   }
   return applied;
+}
+
+void GlRenderer::foresee_entities(std::int64_t sim_time_ns,
+                                  std::span<const EntityUpdate> updates) noexcept {
+  for (const EntityUpdate& update : updates) {
+    const int index = find_entity(update.entity_id);
+    if (index < 0 || !physics::is_valid(update.pose)) continue;
+    history_.entities[static_cast<std::size_t>(index)].foresee(sim_time_ns, update.pose);
+  }
 }
 
 bool GlRenderer::apply_part(std::int64_t sim_time_ns, const PartUpdate& update) noexcept {

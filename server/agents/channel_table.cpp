@@ -70,6 +70,9 @@ std::vector<Camera> cameras_of(const std::optional<scene::ScenarioDesc>& scenari
     found->channels |= ChannelSet{1} << (i % kMaxChannels);
   }
   if (cameras.empty()) cameras.emplace_back();
+  // What is foreseen of entities must not reach images of the frame's own instant.
+  std::ranges::stable_partition(cameras,
+                                [](const Camera& camera) { return !camera.looks_ahead(); });
   return cameras;
 }
 
@@ -105,6 +108,7 @@ physics::Result<ChannelTable> make_channels(const std::optional<scene::ScenarioD
     channel.sensor_width_px = source.width_px;
     channel.sensor_height_px = source.height_px;
     channel.every_nth = wanted.every_nth;
+    channel.look_ahead_frames = source.canned ? 0 : wanted.camera.look_ahead_frames;
     const auto camera = std::ranges::find_if(table.cameras, [&](const Camera& one) {
       return (one.channels >> (channel.index % kMaxChannels) & 1U) != 0;
     });
@@ -276,6 +280,34 @@ TakenPicture take_picture(Picture& picture, const renderer::FrameView& view,
                 window.width_px, copy.begin() + static_cast<std::ptrdiff_t>(row * window.width_px));
   }
   return {copy, 0};
+}
+
+physics::Result<void> check_look_ahead(const scene::ScenarioDesc& scenario,
+                                       const config::DaemonConfig& config) {
+  const auto ahead = std::ranges::find_if(scenario.channels, [](const scene::ChannelDesc& channel) {
+    return channel.camera.look_ahead_frames > 0;
+  });
+  if (ahead == scenario.channels.end()) {
+    return {};
+  }
+  const auto refuse = [&](const std::string& why) {
+    return make_error(ErrorCode::config,
+                      fmt::format("{}: channel '{}' of the scenario has 'look_ahead_frames', {}",
+                                  config.file.string(), ahead->name, why));
+  };
+  const config::PacingConfig& pacing = config.pacing;
+  if (pacing.mode == config::PacingMode::host_step) {
+    return refuse("which needs pacing.mode = \"ig-clock\" or \"trigger\"");
+  }
+  const double ahead_ms = 1e3 * ahead->camera.look_ahead_frames / pacing.rate_hz;
+  const double needed_ms = ahead_ms + static_cast<double>(pacing.display_delay_ns) * 1e-6;
+  if (static_cast<double>(pacing.horizon_ns) * 1e-6 < needed_ms) {
+    return refuse(
+        fmt::format("which needs pacing.horizon_ms of at least {:g}: {:g} ms to the "
+                    "display and {:g} ms ahead",
+                    needed_ms, needed_ms - ahead_ms, ahead_ms));
+  }
+  return {};
 }
 
 }  // namespace emit::server

@@ -32,16 +32,18 @@ struct Channel {
   protocol::PixelQuantity quantity = protocol::PixelQuantity::radiance_w_m2_sr;
   std::uint32_t sensor_width_px = 0;
   std::uint32_t sensor_height_px = 0;
-  std::uint32_t every_nth = 1;  ///< shows frames 1, 1 + n, 1 + 2 n, ... of every run
-  std::size_t picture = 0;      ///< index into Image::pictures
-  std::size_t camera = 0;       ///< index into ChannelTable::cameras
+  std::uint32_t every_nth = 1;          ///< shows frames 1, 1 + n, 1 + 2 n, ... of every run
+  std::uint32_t look_ahead_frames = 0;  ///< its frames show the instant of later ones
+  std::size_t picture = 0;              ///< index into Image::pictures
+  std::size_t camera = 0;               ///< index into ChannelTable::cameras
 };
 
 /// A camera renders the images of channels that look alike. The cameras of a frame show one scene
-/// at one instant, each in an image of its own.
+/// at one instant, each in an image of its own; those that look ahead share a later instant.
 struct Camera {
   scene::ChannelCamera mount;
   bool along_projector = false;  ///< it looks along the projector of a motion simulator
+  [[nodiscard]] bool looks_ahead() const noexcept { return mount.look_ahead_frames > 0; }
   ChannelSet channels = kAllChannels;
 };
 
@@ -71,8 +73,8 @@ struct ChannelTable {
 
 [[nodiscard]] std::string_view to_string(scene::ChannelKind kind) noexcept;
 
-/// Returns the cameras of a scenario's channels, in the order of their first channels. Without
-/// channels it is one.
+/// Returns the cameras of a scenario's channels, in the order of their first channels, with those
+/// that look ahead behind all others. Without channels it is one.
 /// @param motion  with a motion simulator projector channels have a camera of their own
 [[nodiscard]] std::vector<Camera> cameras_of(const std::optional<scene::ScenarioDesc>& scenario,
                                              bool motion);
@@ -102,6 +104,11 @@ struct ChannelTable {
 /// Loads the files that the outputs of a scenario's channels name, for its sensor, and lets go of
 /// them. So a fault shows before a scene is warmed up. Errors: those of make_channels().
 [[nodiscard]] physics::Result<void> check_outputs(const scene::ScenarioDesc& scenario);
+
+/// Refuses channels that look ahead where no next frame is known or poses are not predicted that
+/// far. Errors (config): the text names the daemon's file and the channel.
+[[nodiscard]] physics::Result<void> check_look_ahead(const scene::ScenarioDesc& scenario,
+                                                     const config::DaemonConfig& config);
 
 /// Returns the smallest part of the image that some channels are made of. RT-safe.
 [[nodiscard]] scene::PixelRect window_around(const std::vector<Channel>& channels,

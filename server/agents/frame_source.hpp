@@ -46,6 +46,9 @@ class FrameSource {
 
   virtual std::size_t apply_entities(std::int64_t sim_time_ns,
                                      std::span<const renderer::EntityUpdate> updates) noexcept = 0;
+  /// See Renderer::foresee_entities(). Sources of stored images ignore it.
+  virtual void foresee_entities(std::int64_t /*sim_time_ns*/,
+                                std::span<const renderer::EntityUpdate> /*updates*/) noexcept {}
   /// Drives a part; see Renderer::apply_part(). Sources of stored images ignore it.
   virtual bool apply_part(std::int64_t /*sim_time_ns*/,
                           const renderer::PartUpdate& /*update*/) noexcept {

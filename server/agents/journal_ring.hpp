@@ -56,9 +56,11 @@ struct JournalShot {
   double fov_h_rad = 0.0;
   std::uint32_t channel = 0;  ///< index of the first channel that shows it
   std::uint32_t crc32c = 0;   ///< of the pixels of that channel
+  bool ahead = false;         ///< it shows JournalFrame::ahead_time_ns
 };
 
-/// Head of a line with a frame. entity_count renderer::EntityUpdate follow.
+/// Head of a line with a frame. entity_count renderer::EntityUpdate follow, then
+/// ahead_entity_count.
 struct JournalFrame {
   JournalHead head;
   std::uint64_t frame_number = 0;
@@ -76,9 +78,12 @@ struct JournalFrame {
   std::uint64_t trigger_number = 0;
   std::int64_t slot_begin_ns = 0;
   glm::vec2 shift_px{0.0F};
+  glm::vec2 ahead_shift_px{0.0F};
+  std::int64_t ahead_time_ns = 0;
   std::uint32_t more_shot_count = 0;
   std::array<JournalShot, kMaxCameras - 1> more_shots;
   std::uint32_t entity_count = 0;
+  std::uint32_t ahead_entity_count = 0;
 };
 
 /// Conductor's end of the ring. A line that finds no room is lost and counted. Its sequence number

@@ -105,7 +105,8 @@ struct TimedPart {
 
 /// One camera's part in a frame.
 struct CameraShot {
-  bool due = false;  ///< false: no channel of this camera shows the frame
+  bool due = false;    ///< false: no channel of this camera shows the frame
+  bool ahead = false;  ///< it shows the instant RenderJob::ahead
   physics::Pose pose;
   double fov_h_rad = 0.0;      ///< horizontal; 0: that of the source
   scene::PixelRect window_px;  ///< part of the image that its channels are made of
@@ -126,6 +127,19 @@ struct RenderJob {
   // Motion simulator: what the shift of the image follows from.
   ShownAttitude attitude;
   std::int64_t display_ns = 0;  ///< wall instant at which the frame is shown
+  /// The later instant of the shots that look ahead, with the same for it, and where entities will
+  /// be that do not stand.
+  struct Ahead {
+    std::int64_t sim_time_ns = 0;
+    ShownAttitude attitude;
+    std::int64_t display_ns = 0;
+    std::uint32_t entity_count = 0;
+    std::array<renderer::EntityUpdate, protocol::kMaxEntitiesPerFrame> entities;
+    [[nodiscard]] std::span<const renderer::EntityUpdate> entity_span() const noexcept {
+      return {entities.data(), entity_count};
+    }
+  };
+  Ahead ahead;
   std::uint32_t weather_count = 0;
   std::array<scene::WeatherSample, kMaxWeatherPerFrame> weather;
   std::uint32_t part_count = 0;
@@ -152,6 +166,17 @@ struct CameraImage {
 inline constexpr std::uint32_t kCameraFlags = protocol::kFlagLate | protocol::kFlagDegraded |
                                               protocol::kFlagNonFinite | protocol::kFlagClamped;
 
+/// What a frame says to the channels that look ahead, in place of its header.
+struct AheadImage {
+  std::int64_t sim_time_ns = 0;
+  std::int64_t display_ns = 0;      ///< 0: not known
+  std::uint32_t flags = 0;          ///< those of kAheadFlags that it has
+  glm::vec2 wanted_shift_px{0.0F};  ///< by newest measurements, of which `shift_px` is a part
+  glm::vec2 shift_px{0.0F};         ///< by which the pictures that shift were moved
+};
+/// Flags that depend on the instant that an image shows.
+inline constexpr std::uint32_t kAheadFlags = protocol::kFlagExtrapolated | protocol::kFlagStale;
+
 /// Pixels of one frame, in memory of the source or that of the images for the same slot.
 struct Image {
   FrameSource* source = nullptr;
@@ -164,6 +189,7 @@ struct Image {
   std::array<std::uint32_t, kMaxPictures> clamped_px{};  ///< by the outputs
   /// Shift by which the pictures that shift were moved, right and down in the sensor's image.
   glm::vec2 shift_px{0.0F};
+  AheadImage ahead;  ///< where cameras look ahead
 
   /// Gives the pixels back to the source. RT-safe.
   void release() const noexcept {
@@ -188,7 +214,9 @@ struct RenderDone {
   std::uint8_t quality_level = 0;   ///< quality level, an index into the quality ladder
   float estimated_error_k = 0.0F;   ///< error of that level; NaN: not known
   bool device_failed = false;  ///< the driver reported an error: the pixels are not to be trusted
-  bool shift_known = true;     ///< false: no measurement of the axes is near, so nothing is moved
+  /// False: no measurement of the axes is near, so nothing is moved.
+  bool shift_known = true;
+  bool ahead_shift_known = true;  ///< the same for the images that look ahead
   std::int64_t render_start_ns = 0;
   std::int64_t render_end_ns = 0;
   std::int64_t readback_end_ns = 0;
@@ -216,7 +244,7 @@ struct MotionReport {
 /// Message of conductor to sender. The header lacks the fields that depend on channel and client.
 struct PublishFrame {
   /// True when the image published last is shown again, by those of image.channels that it has
-  /// images for. The other members of `image` are not set then.
+  /// images for. Of the other members of `image` only `ahead` is set then.
   bool repeat = false;
   Image image;
   protocol::FrameHeader header;

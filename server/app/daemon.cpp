@@ -113,6 +113,9 @@ physics::Result<void> DaemonImpl::setup() {
     if (auto checked = check_outputs(*scenario_); !checked) {
       return checked;
     }
+    if (auto checked = check_look_ahead(*scenario_, config_); !checked) {
+      return checked;
+    }
   }
   if (auto started = agents_.start_render(source_factory()); !started) {
     return started;

@@ -79,13 +79,13 @@ NamedTexts texts_of(const google::protobuf::RepeatedPtrField<v1::ChannelInfo>& c
   NamedTexts out;
   for (const v1::ChannelInfo& one : channels) {
     out.emplace_back(
-        one.name(),
-        fmt::format("number {}, {} of sensor {}, band {} ({:g} to {:g} um, {} response "
-                    "samples), {} x {} px at {},{} of {} x {}, every {}",
-                    one.index(), one.kind(), one.sensor(), one.band(), one.band_lo_um(),
-                    one.band_hi_um(), one.response_um_size(), one.width_px(), one.height_px(),
-                    one.window_x_px(), one.window_y_px(), one.sensor_width_px(),
-                    one.sensor_height_px(), std::max(one.every_nth(), 1U)));
+        one.name(), fmt::format("number {}, {} of sensor {}, band {} ({:g} to {:g} um, {} response "
+                                "samples), {} x {} px at {},{} of {} x {}, every {}, {} ahead",
+                                one.index(), one.kind(), one.sensor(), one.band(), one.band_lo_um(),
+                                one.band_hi_um(), one.response_um_size(), one.width_px(),
+                                one.height_px(), one.window_x_px(), one.window_y_px(),
+                                one.sensor_width_px(), one.sensor_height_px(),
+                                std::max(one.every_nth(), 1U), one.look_ahead_frames()));
   }
   return out;
 }

@@ -29,6 +29,20 @@ physics::Pose exact_pose(const v1::Pose& pose) {
   return out;
 }
 
+/// Returns the entities of a decision. Errors: protocol (a pose that is none; the text names the
+/// entity).
+physics::Result<std::vector<renderer::EntityUpdate>> entity_updates(
+    const google::protobuf::RepeatedPtrField<v1::EntityState>& states) {
+  std::vector<renderer::EntityUpdate> out;
+  for (const v1::EntityState& state : states) {
+    out.push_back({state.entity_id(), exact_pose(state.pose()), !state.off(), state.teleport()});
+    if (!physics::is_valid(out.back().pose)) {
+      return make_error(ErrorCode::protocol, fmt::format("entity {}: bad pose", state.entity_id()));
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 struct JournalPlayer::PendingWeather {
@@ -107,13 +121,13 @@ physics::Result<std::optional<ReplayedFrame>> JournalPlayer::apply(const v1::Jou
 
 template <class Shot>
 physics::Result<void> JournalPlayer::play_shot(const v1::FrameDecision& decision, const Shot& shot,
-                                               std::uint64_t sequence) {
+                                               bool ahead, std::uint64_t sequence) {
   const auto fail = [&](ErrorCode code, const std::string& text) {
     return make_error(code, fmt::format("journal entry {}: {}", sequence, text));
   };
   renderer::FrameRequest request;
   request.frame_number = ++render_number_;
-  request.sim_time_ns = decision.sim_time_ns();
+  request.sim_time_ns = ahead ? decision.ahead_time_ns() : decision.sim_time_ns();
   request.thermal_time_ns = decision.thermal_time_ns();
   request.sensor_pose = exact_pose(shot.sensor_pose());
   if (!physics::is_valid(request.sensor_pose)) {
@@ -136,7 +150,9 @@ physics::Result<void> JournalPlayer::play_shot(const v1::FrameDecision& decision
                 fmt::format("the scenario has no channel {}", shot.radiance_channel()));
   }
   const Channel& channel = channels_.channels[shot.radiance_channel()];
-  const glm::vec2 shift_px(decision.applied_shift_x_px(), decision.applied_shift_y_px());
+  const glm::vec2 shift_px =
+      ahead ? glm::vec2(decision.applied_ahead_shift_x_px(), decision.applied_ahead_shift_y_px())
+            : glm::vec2(decision.applied_shift_x_px(), decision.applied_shift_y_px());
   const std::uint32_t crc =
       protocol::crc32c(std::as_bytes(take_picture(channels_.pictures[channel.picture], view,
                                                   shown_.back(), {shift_px, rendered_number_})
@@ -180,23 +196,21 @@ physics::Result<std::optional<ReplayedFrame>> JournalPlayer::play(const v1::Fram
     }
     parts_.erase(parts_.begin(), later_part);
 
-    std::vector<renderer::EntityUpdate> updates;
-    for (const v1::EntityState& state : decision.entities()) {
-      updates.push_back(
-          {state.entity_id(), exact_pose(state.pose()), !state.off(), state.teleport()});
-      if (!physics::is_valid(updates.back().pose)) {
-        return fail(ErrorCode::protocol, fmt::format("entity {}: bad pose", state.entity_id()));
-      }
+    auto updates = entity_updates(decision.entities());
+    auto ahead = entity_updates(decision.ahead_entities());
+    for (const auto* read : {&updates, &ahead}) {
+      if (!*read) return fail(ErrorCode::protocol, read->error().text);
     }
-    source_.apply_entities(decision.sim_time_ns(), updates);
+    source_.apply_entities(decision.sim_time_ns(), *updates);
 
     crcs_match_ = true;
     ++rendered_number_;
-    if (auto played = play_shot(decision, decision, sequence); !played) {
+    if (auto played = play_shot(decision, decision, false, sequence); !played) {
       return tl::unexpected<physics::Error>(std::move(played.error()));
     }
     for (const v1::CameraDecision& camera : decision.more_cameras()) {
-      if (auto played = play_shot(decision, camera, sequence); !played) {
+      if (camera.ahead()) source_.foresee_entities(decision.ahead_time_ns(), *ahead);
+      if (auto played = play_shot(decision, camera, camera.ahead(), sequence); !played) {
         return tl::unexpected<physics::Error>(std::move(played.error()));
       }
     }

@@ -64,10 +64,10 @@ class JournalPlayer {
   struct PendingWeather;
   struct PendingPart;
   /// Renders what one camera showed. `shot` is the decision, for the first one, or one of its
-  /// CameraDecision.
+  /// CameraDecision. `ahead`: it shows the later instant of the decision.
   template <class Shot>
   [[nodiscard]] physics::Result<void> play_shot(const v1::FrameDecision& decision, const Shot& shot,
-                                                std::uint64_t sequence);
+                                                bool ahead, std::uint64_t sequence);
   void release_shown() noexcept;
   [[nodiscard]] physics::Result<std::optional<ReplayedFrame>> play(
       const v1::FrameDecision& decision, std::uint64_t sequence);

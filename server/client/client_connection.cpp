@@ -66,6 +66,7 @@ ChannelDescription describe_channel(const v1::ChannelInfo& info) {
                          info.sensor(),     info.band(),     info.band_lo_um(),
                          info.band_hi_um(), info.width_px(), info.height_px()};
   out.every_nth = std::max(info.every_nth(), 1U);
+  out.look_ahead_frames = info.look_ahead_frames();
   out.window_x_px = info.window_x_px();
   out.window_y_px = info.window_y_px();
   out.sensor_width_px = info.sensor_width_px();

@@ -175,9 +175,20 @@ const std::vector<Case>& cases() {
       {"no_channel_at_the_full_rate",
        "[[channel]]\nname = \"a\"\nband = \"3-5\"\nevery_nth = 2\n"
        "[[channel]]\nname = \"b\"\nband = \"3-5\"\nevery_nth = 4\n",
-       "s.toml:5:13: no channel shows every frame: the daemon's rate is that of its fastest "
-       "channel, "
-       "'every_nth' of one is 1"},
+       "s.toml:5:13: no channel shows every frame at its own instant: 'every_nth' of one is 1, and "
+       "its 'look_ahead_frames' 0"},
+      {"every_channel_looks_ahead",
+       "[[channel]]\nname = \"a\"\nband = \"3-5\"\nlook_ahead_frames = 1\n",
+       "s.toml:2:1: no channel shows every frame at its own instant: 'every_nth' of one is 1, and "
+       "its 'look_ahead_frames' 0"},
+      {"channels_look_ahead_by_different_times",
+       "[[channel]]\nname = \"a\"\nband = \"3-5\"\n"
+       "[[channel]]\nname = \"b\"\nband = \"3-5\"\nlook_ahead_frames = 1\n"
+       "[[channel]]\nname = \"c\"\nband = \"3-5\"\nlook_ahead_frames = 2\n",
+       "s.toml:12:21: 'look_ahead_frames' is 2, but another channel has 1: all channels that look "
+       "ahead show one instant"},
+      {"look_ahead_too_far", "[[channel]]\nname = \"a\"\nband = \"3-5\"\nlook_ahead_frames = 9\n",
+       "s.toml:5:21: 'look_ahead_frames' is 9, must be 0 .. 8"},
       {"rotation_of_45_degrees", "[[channel]]\nname = \"a\"\nband = \"3-5\"\nrotate_deg = 45\n",
        "s.toml:5:14: 'rotate_deg' is 45, must be one of: 0, 90, 180, 270"},
       {"rotation_of_360_degrees", "[[channel]]\nname = \"a\"\nband = \"3-5\"\nrotate_deg = 360\n",

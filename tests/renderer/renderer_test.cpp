@@ -334,6 +334,37 @@ TEST(RendererShadow, a_live_pose_moves_the_caster_from_then_on) {
   EXPECT_EQ(scene.render(pose, kHourNs).object[128 * 320 + 160], 2.0F);
 }
 
+TEST(RendererShadow, what_is_foreseen_is_drawn_as_if_it_were_so_and_leaves_no_trace) {
+  auto scenario = instant_scenario(write_quads("plane", {ground(30.0, 30.0)}));
+  scene::ObjectDesc crate;
+  crate.name = "crate";
+  crate.entity_id = 3;
+  crate.gltf = write_quads("crate", box({-1.0, -1.0, 0.0}, {1.0, 1.0, 2.0}));
+  const glm::dquat north = physics::world_from_body_heading_pitch_roll(0.0, 0.0, 0.0);
+  crate.instances = {{glm::dvec3(0.0), north}};
+  scenario.objects.push_back(crate);
+  const auto pose = looking({0.0, 0.0, 20.0}, {0.0, 0.0, 0.0});
+  constexpr std::int64_t kNextNs = kHourNs + 10'000'000;
+  const renderer::EntityUpdate here{3, {{0.0, 0.0, 0.0}, north}, true, false};
+  const renderer::EntityUpdate there{3, {{1.5, 0.0, 0.0}, north}, true, false};
+  // One renderer foresees the place, the other one gets it from its host.
+  Scene foresees(scenario);
+  ASSERT_EQ(foresees->apply_entities(kHourNs, {&here, 1}), 1U);
+  const auto before = foresees.render(pose, kHourNs);
+  foresees->foresee_entities(kNextNs, {&there, 1});
+  const auto ahead = foresees.render(pose, kNextNs);
+  // The host says otherwise.
+  ASSERT_EQ(foresees->apply_entities(kNextNs, {&here, 1}), 1U);
+  EXPECT_EQ(foresees.render(pose, kNextNs).object, before.object);
+  Scene told(scenario);
+  ASSERT_EQ(told->apply_entities(kHourNs, {&here, 1}), 1U);
+  ASSERT_EQ(told->apply_entities(kNextNs, {&there, 1}), 1U);
+  const auto wanted = told.render(pose, kNextNs);
+  EXPECT_EQ(ahead.object, wanted.object);
+  EXPECT_EQ(share_apart(ahead, wanted, 0.01), 0.0) << "its shadow is there too";
+  EXPECT_GT(share_apart(ahead, before, 1.0), 0.003);
+}
+
 /// Share f_i that a temperature stands for. With long-wave flux alone, surroundings near 0 K and
 /// negligible conduction the equilibrium is eps sigma T^4 = 2 f_i eps L_down.
 scene::ScenarioDesc obscurance_scenario(const std::vector<Quad>& quads, double radius_m) {

@@ -26,6 +26,8 @@ struct SourceScript {
       renderer::QualityLevelStats{}};  ///< quality ladder
   std::vector<renderer::FrameRequest> submitted;
   std::vector<std::pair<std::int64_t, std::vector<renderer::EntityUpdate>>> entities;
+  std::vector<renderer::EntityUpdate> foreseen;  ///< since the last entities were applied
+  std::int64_t foreseen_ns = 0;
   std::vector<std::pair<std::int64_t, renderer::PartUpdate>> parts;
   std::vector<scene::WeatherSample> weather;
   std::vector<std::string> order;  ///< kinds of calls, in order
@@ -55,6 +57,7 @@ class ScriptedSource final : public server::FrameSource {
 
   std::size_t apply_entities(std::int64_t sim_time_ns,
                              std::span<const renderer::EntityUpdate> updates) noexcept override {
+    script_.foreseen.clear();
     if (!updates.empty()) {
       script_.entities.emplace_back(sim_time_ns, std::vector(updates.begin(), updates.end()));
       script_.order.emplace_back("entities");
@@ -68,6 +71,11 @@ class ScriptedSource final : public server::FrameSource {
       mix(static_cast<double>(sim_time_ns));
     }
     return updates.size();
+  }
+  void foresee_entities(std::int64_t sim_time_ns,
+                        std::span<const renderer::EntityUpdate> updates) noexcept override {
+    script_.foreseen_ns = sim_time_ns;
+    script_.foreseen.assign(updates.begin(), updates.end());
   }
   bool apply_part(std::int64_t sim_time_ns, const renderer::PartUpdate& update) noexcept override {
     script_.parts.emplace_back(sim_time_ns, update);
@@ -112,6 +120,11 @@ class ScriptedSource final : public server::FrameSource {
       mix(request.sensor_pose.position_world_m.x);
       mix(static_cast<double>(request.quality_level));
       mix(request.fov_h_rad);
+      for (const auto& update : script_.foreseen) {
+        mix(update.entity_id);
+        mix(update.pose.position_world_m.x);
+        mix(static_cast<double>(script_.foreseen_ns));
+      }
       auto& pixels = pixels_[slot];
       for (std::size_t i = 0; i < pixels.size(); ++i) {
         pixels[i] = static_cast<float>(state_ + static_cast<double>(i));

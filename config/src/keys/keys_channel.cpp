@@ -200,6 +200,13 @@ void add_camera_keys(KeyTable<ChannelDesc>& keys) {
         if (!in.camera.entity_id) return std::nullopt;
         return std::to_string(*in.camera.entity_id);
       }));
+  keys.push_back(written_if<ChannelDesc>(
+      [](const ChannelDesc& in) { return in.camera.look_ahead_frames != 0; },
+      integer<ChannelDesc>("look_ahead_frames", "", 0, limits::kMaxLookAheadFrames,
+                           EMIT_FIELD(camera.look_ahead_frames),
+                           "The channel shows the scene so many frames later, by predicted poses, "
+                           "for arrays that need the next frame early. Needs `pacing.mode` "
+                           "`ig-clock` or `trigger`.")));
 }
 
 }  // namespace

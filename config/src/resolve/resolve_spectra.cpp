@@ -344,6 +344,7 @@ void check_channels(const Node& root, const scene::ScenarioDesc& scenario, bool 
     return;
   }
   bool all_frames = false;
+  std::uint32_t look_ahead_frames = 0;
   for (std::size_t i = 0; i < scenario.channels.size(); ++i) {
     const scene::PixelRect& window = scenario.channels[i].window_px;
     const std::uint32_t width_px = scenario.sensor.width_px;
@@ -358,12 +359,20 @@ void check_channels(const Node& root, const scene::ScenarioDesc& scenario, bool 
     check_output(section->items[i], scenario.channels[i], require_files, diagnostics);
     check_quantity(section->items[i], scenario.channels[i], scenario.bands, diagnostics);
     check_camera(section->items[i], scenario.channels[i].camera, scenario, diagnostics);
-    all_frames = all_frames || scenario.channels[i].every_nth == 1;
+    const std::uint32_t ahead = scenario.channels[i].camera.look_ahead_frames;
+    all_frames = all_frames || (scenario.channels[i].every_nth == 1 && ahead == 0);
+    if (look_ahead_frames == 0) look_ahead_frames = ahead;
+    if (ahead != 0 && ahead != look_ahead_frames) {
+      diagnostics.add(key_location(section->items[i], "look_ahead_frames"),
+                      fmt::format("'look_ahead_frames' is {}, but another channel has {}: all "
+                                  "channels that look ahead show one instant",
+                                  ahead, look_ahead_frames));
+    }
   }
   if (!all_frames && !section->items.empty()) {
     diagnostics.add(key_location(section->items.front(), "every_nth"),
-                    "no channel shows every frame: the daemon's rate is that of its fastest "
-                    "channel, 'every_nth' of one is 1");
+                    "no channel shows every frame at its own instant: 'every_nth' of one is 1, and "
+                    "its 'look_ahead_frames' 0");
   }
 }
 

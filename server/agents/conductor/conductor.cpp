@@ -172,7 +172,8 @@ void Conductor::issue(RenderJob& job, FrameLedger::Issued& issued, bool is_step)
         slots_ ? issued.header.slot_begin_ns : issued.header.host_received_ns;
     motion_->place(job, issued, begin_ns + options_.pacing.display_delay_ns);
   }
-  place_cameras(job, issued.motion.attitude.world_from_rendered);
+  look_ahead(job, issued);
+  place_cameras(job, issued);
   // A frame before the first pose holds no later frame back.
   if (input_.came) {
     last_sim_time_ns_ = job.request.sim_time_ns;
@@ -273,7 +274,8 @@ bool Conductor::publish_image(const RenderDone& done, std::int64_t now_ns) noexc
   if (options_.gateway) {
     report({GatewayReport::Kind::published, ledger_.shown().host_frame_number});
   }
-  journal_.frame(ledger_.shown(), ledger_.shown_for_journal(), true, issued.entity_span(), now_ns);
+  journal_.frame(ledger_.shown(), ledger_.shown_for_journal(), true, issued.entity_span(),
+                 issued.ahead.entity_span(), now_ns);
   ledger_.pop_oldest();
   return true;
 }
@@ -289,11 +291,12 @@ bool Conductor::publish_repeat(std::int64_t now_ns) noexcept {
   frame->header.slot_begin_ns = slot.begin_ns;
   frame->header.trigger_number = slot.trigger_number;
   if (motion_) {
-    motion_->finish_repeat(frame->header, slot.begin_ns + options_.pacing.display_delay_ns);
+    motion_->finish_repeat(frame->header, frame->image.ahead,
+                           slot.begin_ns + options_.pacing.display_delay_ns);
   }
   const FrameHeader header = frame->header;  // the ring's element is the sender's after commit()
   hand_over(header);
-  journal_.frame(header, ledger_.shown_for_journal(), false, {}, now_ns);
+  journal_.frame(header, ledger_.shown_for_journal(), false, {}, {}, now_ns);
   return true;
 }
 

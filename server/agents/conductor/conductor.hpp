@@ -96,12 +96,21 @@ class Conductor final : public Agent {
   /// Places sensor and entities where they are at the instant that the slot shows.
   void place_at_slot(RenderJob& job, FrameLedger::Issued& issued) noexcept;
   void issue(RenderJob& job, FrameLedger::Issued& issued, bool is_step) noexcept;
+  /// Finds where sensor and entities will be at the later instant that some cameras show, where
+  /// there are such (conductor_cameras.cpp).
+  void look_ahead(RenderJob& job, FrameLedger::Issued& issued) noexcept;
+  /// What cameras show: an instant with the seeker, the projector and the places of entities then.
+  struct Moment {
+    physics::Pose seeker;
+    glm::dmat3 world_from_projector{1.0};
+    std::int64_t sim_time_ns = 0;
+    EntityBook::Place place = EntityBook::Place::newest;
+  };
   /// Places the cameras whose channels show the frame (conductor_cameras.cpp). The pose of the
   /// request, the seeker's, becomes that of the first of them.
-  void place_cameras(RenderJob& job, const glm::dmat3& world_from_projector) const noexcept;
+  void place_cameras(RenderJob& job, const FrameLedger::Issued& issued) const noexcept;
   /// Returns what carries a camera.
-  [[nodiscard]] physics::Pose carrier_of(const Camera& camera, const RenderJob& job,
-                                         const glm::dmat3& world_from_projector) const noexcept;
+  [[nodiscard]] physics::Pose carrier_of(const Camera& camera, const Moment& moment) const noexcept;
   void begin_slot() noexcept;
   bool end_slot(std::int64_t now_ns) noexcept;
   [[nodiscard]] bool can_issue() noexcept;
@@ -139,6 +148,7 @@ class Conductor final : public Agent {
   glm::dquat body_from_detector_{1.0, 0.0, 0.0, 0.0};  // gimbals of the seeker, by the host
   double fov_h_rad_ = 0.0;             // of the frames to come, as the host has set it
   std::int64_t last_sim_time_ns_ = 0;  // of the newest frame issued in this run
+  physics::Pose ahead_pose_;           // of the seeker, in the images that look ahead
   bool issued_any_ = false;
   std::array<scene::WeatherSample, kMaxWeatherPerFrame> weather_;  // goes with the next frame
   std::size_t weather_count_ = 0;

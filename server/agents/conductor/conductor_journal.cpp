@@ -37,6 +37,7 @@ void ConductorJournal::host_frame(const protocol::HostFrameData& frame,
 
 void ConductorJournal::frame(const protocol::FrameHeader& header, const Shown& shown, bool rendered,
                              std::span<const renderer::EntityUpdate> entities,
+                             std::span<const renderer::EntityUpdate> ahead_entities,
                              std::int64_t now_ns) noexcept {
   JournalFrame line;
   line.head = {0, now_ns, JournalKind::frame};
@@ -55,10 +56,13 @@ void ConductorJournal::frame(const protocol::FrameHeader& header, const Shown& s
   line.trigger_number = header.trigger_number;
   line.slot_begin_ns = header.slot_begin_ns;
   line.shift_px = shown.shift_px;
+  line.ahead_shift_px = shown.ahead_shift_px;
+  line.ahead_time_ns = shown.ahead_time_ns;
   line.more_shot_count = rendered ? shown.more_shot_count : 0;
   line.more_shots = shown.more_shots;
   line.entity_count = static_cast<std::uint32_t>(entities.size());
-  written(writer_.write(line, entities));
+  line.ahead_entity_count = static_cast<std::uint32_t>(ahead_entities.size());
+  written(writer_.write(line, entities, ahead_entities));
 }
 
 void ConductorJournal::written(bool found_room) noexcept {

@@ -24,15 +24,18 @@ class ConductorJournal {
   struct Shown {
     std::int64_t thermal_time_ns = 0;
     double fov_h_rad = 0.0;
-    std::uint32_t crc32c = 0;   ///< of the pixels of `channel`
-    std::uint32_t channel = 0;  ///< index of the first channel that shows the image
-    glm::vec2 shift_px{0.0F};   ///< shift of the pictures that shift
+    std::uint32_t crc32c = 0;        ///< of the pixels of `channel`
+    std::uint32_t channel = 0;       ///< index of the first channel that shows the image
+    glm::vec2 shift_px{0.0F};        ///< shift of the pictures that shift
+    glm::vec2 ahead_shift_px{0.0F};  ///< of those that look ahead
+    std::int64_t ahead_time_ns = 0;  ///< instant that these show
     std::uint32_t more_shot_count = 0;
     std::array<JournalShot, kMaxCameras - 1> more_shots;
   };
   /// @param rendered  false: the previous frame is repeated
   void frame(const protocol::FrameHeader& header, const Shown& shown, bool rendered,
-             std::span<const renderer::EntityUpdate> entities, std::int64_t now_ns) noexcept;
+             std::span<const renderer::EntityUpdate> entities,
+             std::span<const renderer::EntityUpdate> ahead_entities, std::int64_t now_ns) noexcept;
 
  private:
   /// Counts a line that found no room, and wakes the recorder.

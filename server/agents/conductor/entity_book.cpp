@@ -106,13 +106,21 @@ void EntityBook::add_update(RenderJob& job, Entity& entity, const physics::Pose&
 }
 
 physics::Pose EntityBook::pose_of(std::uint32_t id, std::int64_t sim_time_ns,
-                                  bool placed) const noexcept {
+                                  Place place) const noexcept {
   const auto found = std::lower_bound(entities_.begin(), entities_.end(), id,
                                       [](const Entity& a, std::uint32_t b) { return a.id < b; });
   if (found == entities_.end() || found->id != id || found->track.empty()) {
     return scenario_.entity_at(id, sim_time_ns).pose;
   }
-  return placed ? found->placed.pose : found->track.newest().pose;
+  switch (place) {
+    case Place::newest:
+      return found->track.newest().pose;
+    case Place::placed:
+      return found->placed.pose;
+    case Place::foreseen:
+      break;
+  }
+  return found->foreseen;
 }
 
 bool EntityBook::add_marked(RenderJob& job) noexcept {
@@ -172,6 +180,20 @@ bool EntityBook::add_all_at(RenderJob& job, std::int64_t shown_ns,
   static_cast<void>(add_wanted(job, shown_ns, next_standing_, kAll, overdue) &&
                     add_wanted(job, shown_ns, next_standing_, kAll, any));
   return up_to_date;
+}
+
+bool EntityBook::foresee(RenderJob& job, std::int64_t horizon_ns) noexcept {
+  RenderJob::Ahead& ahead = job.ahead;
+  ahead.entity_count = 0;
+  bool complete = true;
+  for (Entity& entity : entities_) {
+    entity.foreseen = entity.track.sample(ahead.sim_time_ns, horizon_ns).pose;
+    if (same_place(entity.placed.pose, entity.foreseen)) continue;
+    complete = ahead.entity_count < ahead.entities.size();
+    if (!complete) continue;
+    ahead.entities[ahead.entity_count++] = {entity.id, entity.foreseen, entity.on, false};
+  }
+  return complete;
 }
 
 }  // namespace emit::server

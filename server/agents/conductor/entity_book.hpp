@@ -29,11 +29,13 @@ class EntityBook {
   /// @param mark  also lists the entity for add_marked(), where frames belong to poses
   void store(const protocol::EntityStateData& state, std::int64_t sim_time_ns, bool mark) noexcept;
 
+  /// Which place of an entity counts: that of its newest pose, or where add_all_at() or foresee()
+  /// has placed it.
+  enum class Place : std::uint8_t { newest, placed, foreseen };
   /// Returns where an entity is in the frame that is made up at `sim_time_ns`. Without a pose of a
   /// host the scenario says it.
-  /// @param placed  add_all_at() has placed the entities; otherwise the newest pose counts
   [[nodiscard]] physics::Pose pose_of(std::uint32_t id, std::int64_t sim_time_ns,
-                                      bool placed) const noexcept;
+                                      Place place) const noexcept;
 
   /// Adds the newest pose of every marked entity to the job, oldest mark first. Returns false when
   /// some had no room; they are still marked.
@@ -42,6 +44,9 @@ class EntityBook {
   /// that stand, round robin. Returns false when not all that moved had room.
   [[nodiscard]] bool add_all_at(RenderJob& job, std::int64_t shown_ns,
                                 std::int64_t horizon_ns) noexcept;
+  /// Adds to the job where the entities will be at job.ahead.sim_time_ns, those that will have
+  /// moved since add_all_at(). Returns false when not all had room.
+  [[nodiscard]] bool foresee(RenderJob& job, std::int64_t horizon_ns) noexcept;
 
  private:
   struct Entity {
@@ -60,6 +65,7 @@ class EntityBook {
     };
     std::optional<Sent> sent;  // the last update
     PoseSample placed;         // its place in the frame that is made up
+    physics::Pose foreseen;    // its place in images of that frame that look ahead
     bool moved = false;        // `placed` differs from `sent`
     bool in_job = false;       // the frame that is made up has it already
   };

@@ -25,6 +25,8 @@ FrameLedger::Issued& FrameLedger::next() noexcept {
   Issued& issued = issued_[(first_ + in_work_) % kMaxInWork];
   issued.header = {};
   issued.entities_behind = false;
+  issued.ahead.image = {};
+  issued.ahead.entity_count = 0;
   issued.entity_count = 0;
   return issued;
 }
@@ -44,6 +46,8 @@ void FrameLedger::issue(RenderJob& job, Issued& issued) noexcept {
   issued.thermal_time_ns = job.request.thermal_time_ns;
   issued.entity_count = job.entity_count;
   std::copy_n(job.entities.begin(), job.entity_count, issued.entities.begin());
+  issued.ahead.entity_count = job.ahead.entity_count;
+  std::copy_n(job.ahead.entities.begin(), job.ahead.entity_count, issued.ahead.entities.begin());
   ++in_work_;
 }
 
@@ -68,6 +72,8 @@ void FrameLedger::fill_image(PublishFrame& out, const RenderDone& done, bool lat
   };
   out.repeat = false;
   out.image = done.image;
+  out.image.ahead = issued.ahead.image;
+  shown_ahead_ = issued.ahead.image;
   FrameHeader& header = out.header;
   header = issued.header;
   header.frame_number = ++frame_number_;
@@ -99,6 +105,8 @@ void FrameLedger::fill_image(PublishFrame& out, const RenderDone& done, bool lat
   shown_for_journal_.thermal_time_ns = issued.thermal_time_ns;
   shown_for_journal_.fov_h_rad = issued.fov_h_rad;
   shown_for_journal_.shift_px = done.image.shift_px;
+  shown_for_journal_.ahead_shift_px = done.image.ahead.shift_px;
+  shown_for_journal_.ahead_time_ns = issued.ahead.image.sim_time_ns;
   note_shots(done.image);
 }
 
@@ -112,7 +120,7 @@ void FrameLedger::note_shots(const Image& image) noexcept {
     });
     if (!camera.shown || channel == context_.channels.end()) continue;
     const JournalShot shot{camera.pose, camera.fov_h_rad, channel->index,
-                           image.crc32c[channel->picture]};
+                           image.crc32c[channel->picture], channel->look_ahead_frames > 0};
     if (first) {
       shown_for_journal_.channel = shot.channel;
       shown_for_journal_.crc32c = shot.crc32c;
@@ -144,6 +152,7 @@ void FrameLedger::note_quality(FrameHeader& header, const Quality& quality) noex
 void FrameLedger::fill_repeat(PublishFrame& out) noexcept {
   out.repeat = true;
   out.image = {};
+  out.image.ahead = shown_ahead_;
   out.image.channels = due_channels(context_.channels, frame_number_ + 1);
   out.header = shown_;
   out.header.frame_number = ++frame_number_;

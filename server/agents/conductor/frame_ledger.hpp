@@ -28,6 +28,17 @@ class FrameLedger {
       std::uint8_t faults = 0;  ///< protocol::MotionFaults
     };
     Motion motion;
+    /// What the images that look ahead show.
+    struct Ahead {
+      AheadImage image;
+      Motion motion;
+      std::uint32_t entity_count = 0;
+      std::array<renderer::EntityUpdate, protocol::kMaxEntitiesPerFrame> entities;
+      [[nodiscard]] std::span<const renderer::EntityUpdate> entity_span() const noexcept {
+        return {entities.data(), entity_count};
+      }
+    };
+    Ahead ahead;
     std::uint32_t entity_count = 0;
     std::array<renderer::EntityUpdate, protocol::kMaxEntitiesPerFrame> entities;
     [[nodiscard]] std::span<const renderer::EntityUpdate> entity_span() const noexcept {
@@ -95,6 +106,7 @@ class FrameLedger {
   std::size_t first_ = 0;
   std::size_t in_work_ = 0;
   protocol::FrameHeader shown_;
+  AheadImage shown_ahead_;
   ConductorJournal::Shown shown_for_journal_;
 };
 

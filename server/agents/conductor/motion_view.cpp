@@ -127,18 +127,36 @@ void MotionView::place(RenderJob& job, FrameLedger::Issued& issued,
                        std::int64_t display_ns) noexcept {
   take_reports();
   bool known = true;
-  ShownAttitude& attitude = issued.motion.attitude;
-  attitude.world_from_seeker = glm::mat3_cast(job.request.sensor_pose.world_from_body);
-  attitude.world_from_rendered = attitude.world_from_seeker;
-  if (plan_.projects) {
-    issued.header.display_ns = display_ns;
-    attitude.world_from_rendered = plan_.follower.table.world_from_projector(
-        attitude.world_from_seeker, angles_at(display_ns, known));
-  }
-  job.attitude = attitude;
+  if (plan_.projects) issued.header.display_ns = display_ns;
+  issued.motion.attitude = attitude_at(job.request.sensor_pose, display_ns, known);
+  job.attitude = issued.motion.attitude;
   job.display_ns = display_ns;
   issued.motion.faults = faults_;
   if (!known) issued.motion.faults |= protocol::kMotionNoFeedback;
+}
+
+void MotionView::place_ahead(RenderJob& job, FrameLedger::Issued& issued,
+                             const physics::Pose& sensor_pose, std::int64_t display_ns) noexcept {
+  // Whether the axes are known so far ahead is judged when the image is finished.
+  bool known = true;
+  FrameLedger::Issued::Ahead& ahead = issued.ahead;
+  if (plan_.projects) ahead.image.display_ns = display_ns;
+  ahead.motion.attitude = attitude_at(sensor_pose, display_ns, known);
+  ahead.motion.faults = issued.motion.faults;
+  job.ahead.attitude = ahead.motion.attitude;
+  job.ahead.display_ns = display_ns;
+}
+
+ShownAttitude MotionView::attitude_at(const physics::Pose& sensor_pose, std::int64_t display_ns,
+                                      bool& known) const noexcept {
+  ShownAttitude attitude;
+  attitude.world_from_seeker = glm::mat3_cast(sensor_pose.world_from_body);
+  attitude.world_from_rendered = attitude.world_from_seeker;
+  if (plan_.projects) {
+    attitude.world_from_rendered = plan_.follower.table.world_from_projector(
+        attitude.world_from_seeker, angles_at(display_ns, known));
+  }
+  return attitude;
 }
 
 void MotionView::finish(FrameLedger::Issued& issued, const RenderDone& done) noexcept {
@@ -152,12 +170,41 @@ void MotionView::finish(FrameLedger::Issued& issued, const RenderDone& done) noe
     shift = done.image.shift_px;
   }
   write(issued.header, finished_, shift);
+  ahead_by_ns_ = 0;
+  AheadImage& ahead = issued.ahead.image;
+  if (ahead.display_ns == 0) return;
+  finished_ahead_ = issued.ahead.motion;
+  ahead_by_ns_ = ahead.display_ns - issued.header.display_ns;
+  ahead.shift_px = done.image.ahead.shift_px;
+  glm::dvec2 ahead_shift(std::numeric_limits<double>::quiet_NaN());
+  if (!context_.shifts_pictures) {
+    ahead_shift = shift_px(finished_ahead_.attitude, ahead.display_ns);
+  } else if (done.ahead_shift_known) {
+    ahead_shift = ahead.shift_px;
+  }
+  write_ahead(ahead, finished_ahead_, ahead_shift);
+  ahead_ = ahead;
 }
 
-void MotionView::finish_repeat(FrameHeader& header, std::int64_t display_ns) noexcept {
+void MotionView::finish_repeat(FrameHeader& header, AheadImage& ahead,
+                               std::int64_t display_ns) noexcept {
   take_reports();
   if (plan_.projects) header.display_ns = display_ns;
   write(header, finished_, shift_px(finished_.attitude, display_ns));
+  if (ahead_by_ns_ == 0) return;
+  ahead = ahead_;
+  ahead.display_ns = display_ns + ahead_by_ns_;
+  write_ahead(ahead, finished_ahead_, shift_px(finished_ahead_.attitude, ahead.display_ns));
+}
+
+void MotionView::write_ahead(AheadImage& ahead, const FrameLedger::Issued::Motion& motion,
+                             const glm::dvec2& shift_px) const noexcept {
+  const bool known = std::isfinite(shift_px.x + shift_px.y);
+  ahead.wanted_shift_px = known ? glm::vec2(shift_px) : ahead.shift_px;
+  ahead.flags &= ~std::uint32_t{protocol::kFlagMotionFault};
+  if (!known || state_ != MotionState::following || (motion.faults | faults_) != 0) {
+    ahead.flags |= protocol::kFlagMotionFault;
+  }
 }
 
 void MotionView::write(FrameHeader& header, const FrameLedger::Issued::Motion& motion,

@@ -38,12 +38,17 @@ class MotionView {
 
   /// Finds the attitudes of a frame that is shown at `display_ns`, wall.
   void place(RenderJob& job, FrameLedger::Issued& issued, std::int64_t display_ns) noexcept;
+  /// Finds those of the images that look ahead, with the seeker in `sensor_pose`.
+  /// @pre place() has placed the frame
+  void place_ahead(RenderJob& job, FrameLedger::Issued& issued, const physics::Pose& sensor_pose,
+                   std::int64_t display_ns) noexcept;
   /// Writes state and shift into the header of a finished frame. Where pictures shift, it is the
   /// shift that they were moved by.
   void finish(FrameLedger::Issued& issued, const RenderDone& done) noexcept;
   /// Writes state and shift into the header of the frame that finish() had last, which is shown
-  /// again at `display_ns`.
-  void finish_repeat(protocol::FrameHeader& header, std::int64_t display_ns) noexcept;
+  /// again at `display_ns`, and what its images that look ahead say then.
+  void finish_repeat(protocol::FrameHeader& header, AheadImage& ahead,
+                     std::int64_t display_ns) noexcept;
 
  private:
   /// A frame whose axes are not measured up to its display yet.
@@ -54,6 +59,13 @@ class MotionView {
   };
   static constexpr std::size_t kKept = 64;
 
+  /// Returns the attitudes of an image with the seeker in `sensor_pose`. `known` becomes false
+  /// where no measurement is near.
+  [[nodiscard]] ShownAttitude attitude_at(const physics::Pose& sensor_pose, std::int64_t display_ns,
+                                          bool& known) const noexcept;
+  /// Writes the shift that an image that looks ahead has at its display, or that it is not known.
+  void write_ahead(AheadImage& ahead, const FrameLedger::Issued::Motion& motion,
+                   const glm::dvec2& shift_px) const noexcept;
   /// Returns the angles at an instant. `known` is false where no measurement is near.
   [[nodiscard]] TableAngles angles_at(std::int64_t time_ns, bool& known) const noexcept;
   /// Returns the shift that brings the image to where the axes are at `display_ns`. It is not a
@@ -80,8 +92,11 @@ class MotionView {
   bool target_moved_ = false;     ///< the host has moved the target in this run
   /// Kind of the message that the motion agent had no room for; pose: there is none.
   MotionInput::Kind pending_ = MotionInput::Kind::pose;
-  FrameLedger::Issued::Motion finished_;  ///< of the newest finished frame
-  glm::vec2 applied_px_{0.0F};            ///< shift by which its pictures were moved
+  FrameLedger::Issued::Motion finished_;        ///< of the newest finished frame
+  glm::vec2 applied_px_{0.0F};                  ///< shift by which its pictures were moved
+  FrameLedger::Issued::Motion finished_ahead_;  ///< of its images that look ahead
+  AheadImage ahead_;                            ///< and what they said
+  std::int64_t ahead_by_ns_ = 0;  ///< time from its display to theirs; 0: there are none
   std::array<Shown, kKept> shown_;
   std::size_t first_shown_ = 0;
   std::size_t shown_count_ = 0;

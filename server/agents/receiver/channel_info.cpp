@@ -21,6 +21,7 @@ void fill(const Channel& channel, v1::ChannelInfo& out) {
   out.set_width_px(channel.width_px);
   out.set_height_px(channel.height_px);
   out.set_every_nth(channel.every_nth);
+  out.set_look_ahead_frames(channel.look_ahead_frames);
   out.set_window_x_px(channel.window_px.x_px);
   out.set_window_y_px(channel.window_px.y_px);
   out.set_window_width_px(channel.window_px.width_px);

@@ -62,14 +62,29 @@ bool host_frame(std::span<const std::byte> bytes, v1::HostFrame& out) {
   return true;
 }
 
+void add_entities(std::span<const renderer::EntityUpdate> updates,
+                  google::protobuf::RepeatedPtrField<v1::EntityState>& out) {
+  for (const renderer::EntityUpdate& update : updates) {
+    protocol::EntityStateData state;
+    state.entity_id = update.entity_id;
+    state.pose = update.pose;
+    state.has_pose = true;
+    state.on = update.on;
+    state.teleport = update.teleport;
+    protocol::to_proto(state, *out.Add());
+  }
+}
+
 bool decision(std::span<const std::byte> bytes, v1::FrameDecision& out) {
   JournalFrame line;
   std::vector<renderer::EntityUpdate> entities(protocol::kMaxEntitiesPerFrame);
+  std::vector<renderer::EntityUpdate> ahead(protocol::kMaxEntitiesPerFrame);
   if (!read(bytes, line)) {
     return false;
   }
   bytes = bytes.subspan(sizeof(line));
-  if (!read_elements(bytes, line.entity_count, entities) || !bytes.empty()) {
+  if (!read_elements(bytes, line.entity_count, entities) ||
+      !read_elements(bytes, line.ahead_entity_count, ahead) || !bytes.empty()) {
     return false;
   }
   out.set_frame_number(line.frame_number);
@@ -98,15 +113,14 @@ bool decision(std::span<const std::byte> bytes, v1::FrameDecision& out) {
     camera.set_fov_h_rad(shot.fov_h_rad);
     camera.set_radiance_crc32c(shot.crc32c);
     camera.set_radiance_channel(shot.channel);
+    camera.set_ahead(shot.ahead);
   }
-  for (std::uint32_t i = 0; i < line.entity_count; ++i) {
-    protocol::EntityStateData state;
-    state.entity_id = entities[i].entity_id;
-    state.pose = entities[i].pose;
-    state.has_pose = true;
-    state.on = entities[i].on;
-    state.teleport = entities[i].teleport;
-    protocol::to_proto(state, *out.add_entities());
+  add_entities(std::span(entities).first(line.entity_count), *out.mutable_entities());
+  if (line.ahead_time_ns != 0) {
+    out.set_ahead_time_ns(line.ahead_time_ns);
+    out.set_applied_ahead_shift_x_px(line.ahead_shift_px.x);
+    out.set_applied_ahead_shift_y_px(line.ahead_shift_px.y);
+    add_entities(std::span(ahead).first(line.ahead_entity_count), *out.mutable_ahead_entities());
   }
   return true;
 }

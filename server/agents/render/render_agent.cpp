@@ -87,6 +87,8 @@ bool RenderAgent::take_job() noexcept {
         next.render_start_ns = context_.clock.tai_ns();
         next.attitude = job->attitude;
         next.display_ns = job->display_ns;
+        next.ahead_attitude = job->ahead.attitude;
+        next.ahead_display_ns = job->ahead.display_ns;
         next.channels = job->channels;
         next.rendered_number = job->rendered_number;
         job_prepared_ = true;
@@ -125,6 +127,10 @@ bool RenderAgent::submit_shots(RenderJob& job) noexcept {
     request.sensor_pose = shot.pose;
     request.fov_h_rad = shot.fov_h_rad;
     request.window_px = shot.window_px;
+    if (shot.ahead) {
+      source_->foresee_entities(job.ahead.sim_time_ns, job.ahead.entity_span());
+      request.sim_time_ns = job.ahead.sim_time_ns;
+    }
     // One quality level holds for all images of a frame, which share the time that is left.
     if (frame.shots == 0) {
       frame.quality_level = choose_quality_level(job, request, context_.clock.tai_ns(), due);
@@ -320,7 +326,7 @@ void RenderAgent::finish_shot(InFlight& frame, std::size_t camera, RenderDone& d
   done.device_failed = done.device_failed || view.device_failed;
   note_device(view);
   if (frame.collected == 0) {
-    find_shift(frame, done);
+    find_shifts(frame, done);
   }
   take_pictures(frame, camera, view, image.slot, done.image);
 }
@@ -332,17 +338,28 @@ void RenderAgent::take_feedback() noexcept {
   }
 }
 
-void RenderAgent::find_shift(const InFlight& frame, RenderDone& done) noexcept {
-  done.shift_known = true;
+void RenderAgent::find_shifts(const InFlight& frame, RenderDone& done) noexcept {
+  done.shift_known = done.ahead_shift_known = true;
   done.image.shift_px = glm::vec2(0.0F);
+  done.image.ahead = {};
   if (!shifts_) return;
   take_feedback();
-  if (const auto shift_px = shifts_->shift_px(frame.attitude, frame.display_ns)) {
-    done.image.shift_px = *shift_px;
-    return;
+  done.shift_known = find_shift(frame.attitude, frame.display_ns, done.image.shift_px);
+  const bool ahead = std::ranges::any_of(context_.cameras,
+                                         [](const Camera& camera) { return camera.looks_ahead(); });
+  if (!ahead) return;
+  done.ahead_shift_known =
+      find_shift(frame.ahead_attitude, frame.ahead_display_ns, done.image.ahead.shift_px);
+}
+
+bool RenderAgent::find_shift(const ShownAttitude& attitude, std::int64_t display_ns,
+                             glm::vec2& shift_px) noexcept {
+  if (const auto found_px = shifts_->shift_px(attitude, display_ns)) {
+    shift_px = *found_px;
+    return true;
   }
-  done.shift_known = false;
   context_.counters.add(Counter::output_shifts_unknown);
+  return false;
 }
 
 void RenderAgent::take_pictures(const InFlight& frame, std::size_t camera,
@@ -353,8 +370,10 @@ void RenderAgent::take_pictures(const InFlight& frame, std::size_t camera,
     if (pictures[i].camera != camera || (pictures[i].channels & image.channels) == 0) {
       continue;
     }
+    const glm::vec2& shift_px =
+        context_.cameras[camera].looks_ahead() ? image.ahead.shift_px : image.shift_px;
     const TakenPicture taken =
-        take_picture(pictures[i], view, slot, {image.shift_px, frame.rendered_number});
+        take_picture(pictures[i], view, slot, {shift_px, frame.rendered_number});
     image.pictures[i] = taken.pixels;
     image.clamped_px[i] = taken.clamped_px;
     context_.counters.add(Counter::output_px_clamped, taken.clamped_px);

@@ -51,6 +51,9 @@ class RenderAgent final : public Agent {
     std::uint8_t quality_level = 0;
     ShownAttitude attitude;
     std::int64_t display_ns = 0;
+    // The same for the images that look ahead.
+    ShownAttitude ahead_attitude;
+    std::int64_t ahead_display_ns = 0;
     std::int64_t render_start_ns = 0;
     double expected_ms = 0.0;   ///< time of its quality level, by the ladder
     std::int64_t begun_ns = 0;  ///< monotonic; render_start_ns is TAI
@@ -81,8 +84,11 @@ class RenderAgent final : public Agent {
   void finish_shot(InFlight& frame, std::size_t camera, RenderDone& done) noexcept;
   /// Takes what the axes of a motion simulator measured.
   void take_feedback() noexcept;
-  /// Finds the shift of the frame by the newest measurements, where pictures shift.
-  void find_shift(const InFlight& frame, RenderDone& done) noexcept;
+  /// Finds the shifts of the frame by the newest measurements, where pictures shift.
+  void find_shifts(const InFlight& frame, RenderDone& done) noexcept;
+  /// Finds one shift, and counts where it is not known. Returns false then.
+  [[nodiscard]] bool find_shift(const ShownAttitude& attitude, std::int64_t display_ns,
+                                glm::vec2& shift_px) noexcept;
   /// Takes the pictures of one camera that image.channels show, and their checksums.
   void take_pictures(const InFlight& frame, std::size_t camera, const renderer::FrameView& view,
                      renderer::SlotIndex slot, Image& image) noexcept;

@@ -11,7 +11,11 @@ class RendererSource final : public FrameSource {
 
   std::size_t apply_entities(std::int64_t sim_time_ns,
                              std::span<const renderer::EntityUpdate> updates) noexcept override {
-    return updates.empty() ? 0 : renderer_->apply_entities(sim_time_ns, updates);
+    return renderer_->apply_entities(sim_time_ns, updates);
+  }
+  void foresee_entities(std::int64_t sim_time_ns,
+                        std::span<const renderer::EntityUpdate> updates) noexcept override {
+    renderer_->foresee_entities(sim_time_ns, updates);
   }
   bool apply_part(std::int64_t sim_time_ns, const renderer::PartUpdate& update) noexcept override {
     return renderer_->apply_part(sim_time_ns, update);

@@ -118,6 +118,7 @@ int Sender::take_published() noexcept {
     added.image = published->repeat ? last_ : published->image;
     if (published->repeat) {
       added.image.channels &= published->image.channels;
+      added.image.ahead = published->image.ahead;
     }
     hold(added.image);
     if (keep_last_ && !published->repeat) {

@@ -48,6 +48,15 @@ protocol::FrameHeader SenderClient::header_for(const Channel& channel,
       out.flags &= ~std::uint32_t{protocol::kFlagLate};
     }
   }
+  glm::vec2 shift_px = image.shift_px;
+  if (channel.look_ahead_frames > 0) {
+    out.sim_time_ns = image.ahead.sim_time_ns;
+    out.display_ns = image.ahead.display_ns;
+    out.flags = (out.flags & ~kAheadFlags) | image.ahead.flags;
+    out.shift_x_px = image.ahead.wanted_shift_px.x;
+    out.shift_y_px = image.ahead.wanted_shift_px.y;
+    shift_px = image.ahead.shift_px;
+  }
   if (channel.kind == scene::ChannelKind::injection && out.display_ns != 0) {
     // The axes do not stand between this image and its detector.
     out.shift_x_px = out.shift_y_px = 0.0F;
@@ -62,11 +71,11 @@ protocol::FrameHeader SenderClient::header_for(const Channel& channel,
     out.sensor_height_px = channel.sensor_height_px;
   }
   if ((channel.output_steps & protocol::kOutputShifted) != 0) {
-    out.applied_shift_x_px = image.shift_px.x;
-    out.applied_shift_y_px = image.shift_px.y;
+    out.applied_shift_x_px = shift_px.x;
+    out.applied_shift_y_px = shift_px.y;
     // 0 remains, unless the image is shown again and the axes have moved on.
-    out.shift_x_px -= image.shift_px.x;
-    out.shift_y_px -= image.shift_px.y;
+    out.shift_x_px -= shift_px.x;
+    out.shift_y_px -= shift_px.y;
   }
   out.quantity = channel.quantity;
   if (const std::uint32_t clamped_px = image.clamped_px[channel.picture]; clamped_px > 0) {

@@ -41,8 +41,8 @@ void SocketClient::begin(const protocol::FrameHeader& header, const Image& image
   start(header, now_ns);
   const Channel& channel = *params_.channel;
   pixels_ = std::as_bytes(image.pictures[channel.picture]);
-  sim_time_ns_ = header.sim_time_ns;
   out_ = header_for(channel, image);
+  sim_time_ns_ = out_.sim_time_ns;
   const std::span head(head_);
   if (params_.udp) {
     protocol::encode(out_,

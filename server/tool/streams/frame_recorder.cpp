@@ -33,6 +33,7 @@ void fill_channel(const client::ChannelDescription& channel, v1::ChannelInfo& ou
   out.set_width_px(channel.width_px);
   out.set_height_px(channel.height_px);
   out.set_every_nth(channel.every_nth);
+  out.set_look_ahead_frames(channel.look_ahead_frames);
   out.set_window_x_px(channel.window_x_px);
   out.set_window_y_px(channel.window_y_px);
   out.set_sensor_width_px(channel.sensor_width_px);

@@ -67,6 +67,29 @@ TEST(PoseHistory, live_poses_override_the_script_from_their_time_on_and_reset_br
   EXPECT_EQ(history.events_ns().size(), 3U);
 }
 
+TEST(PoseHistory, what_is_foreseen_counts_after_the_newest_pose_until_the_next_one) {
+  PoseHistory history(scripted(), at_east(0.0));
+  history.foresee(2 * kSecondNs, at_east(9.0));
+  EXPECT_EQ(history.at(2 * kSecondNs).pose.position_world_m.x, 0.0) << "the script goes on";
+  ASSERT_TRUE(history.append(kSecondNs, at_east(1.0), true, false));
+  const PoseHistory::Known known = history.known();
+  history.foresee(kSecondNs, at_east(9.0));
+  EXPECT_EQ(history.at(kSecondNs).pose.position_world_m.x, 1.0) << "the host has said it";
+  history.foresee(3 * kSecondNs, at_east(5.0));
+  EXPECT_EQ(history.at(kSecondNs).pose.position_world_m.x, 1.0);
+  EXPECT_EQ(history.at(2 * kSecondNs).pose.position_world_m.x, 3.0);
+  EXPECT_EQ(history.at(3 * kSecondNs).pose.position_world_m.x, 5.0);
+  EXPECT_EQ(history.at(9 * kSecondNs).pose.position_world_m.x, 5.0) << "it stands from there on";
+  // The history of shade does not know of it.
+  EXPECT_FALSE(history.departs(known, 3 * kSecondNs));
+  EXPECT_EQ(history.known().newest.sim_time_ns, kSecondNs);
+  history.forget();
+  EXPECT_EQ(history.at(3 * kSecondNs).pose.position_world_m.x, 1.0);
+  history.foresee(3 * kSecondNs, at_east(5.0));
+  ASSERT_TRUE(history.append(2 * kSecondNs, at_east(2.0), true, false));
+  EXPECT_EQ(history.at(3 * kSecondNs).pose.position_world_m.x, 2.0);
+}
+
 TEST(PoseHistory, refuses_time_going_back) {
   PoseHistory history(scripted(), at_east(0.0));
   EXPECT_TRUE(history.append(50 * kSecondNs, at_east(0.0), true, false));

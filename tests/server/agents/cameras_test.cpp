@@ -153,6 +153,125 @@ TEST(Cameras, WaitForSlotsWithoutLosingOrRepeatingAnImage) {
   EXPECT_EQ(rig.script.held.load(), 0);
 }
 
+/// The seeker, the same a frame later, and the view of entity 7 a frame later.
+scene::ScenarioDesc views_ahead() {
+  scene::ScenarioDesc scenario = four_views();
+  scenario.channels.clear();
+  for (const char* name : {"carried", "next", "now"}) {
+    scenario.channels.push_back({name, scene::ChannelKind::injection, "8-12"});
+    scenario.channels.back().camera.look_ahead_frames = 1;
+  }
+  scenario.channels[0].camera.entity_id = 7;
+  scenario.channels[2].camera.look_ahead_frames = 0;
+  return scenario;
+}
+
+TEST(Cameras, LookAheadToWhereTheNextFrameWillBe) {
+  config::PacingConfig pacing;
+  pacing.mode = config::PacingMode::ig_clock;
+  pacing.rate_hz = 100.0;
+  pacing.horizon_ns = 30 * kMs;
+  CameraRig rig(pacing, views_ahead());
+  use_channels_of(rig, views_ahead());
+  ASSERT_EQ(rig.context().cameras.size(), 3U);
+  EXPECT_FALSE(rig.context().cameras[0].looks_ahead()) << "the frame's own instant comes first";
+  const glm::dquat level = physics::world_from_body_heading_pitch_roll(0.0, 0.0, 0.0);
+  // The source gets the place of the entity for the later instant alone, after the frame's own.
+  std::vector<double> foreseen_m;
+  rig.script.on_submit = [&](const renderer::FrameRequest& request) {
+    const auto& foreseen = rig.script.foreseen;
+    if (foreseen.empty()) return;
+    EXPECT_EQ(request.sim_time_ns, rig.script.foreseen_ns);
+    ASSERT_EQ(foreseen.size(), 1U);
+    EXPECT_EQ(foreseen[0].entity_id, 7U);
+    foreseen_m.push_back(foreseen[0].pose.position_world_m.x);
+  };
+  rig.settle();
+  rig.frames.clear();
+  // The seeker flies east with 100 m/s, and the entity follows with 40 m/s^2 of acceleration. Both
+  // state their rates; the host sends every 10 ms, until it falls silent.
+  const auto entity_m = [](double t_s) { return 10.0 * t_s + 20.0 * t_s * t_s; };
+  for (std::uint64_t k = 1; k <= 30; ++k) {
+    const double t_s = 0.01 * static_cast<double>(k);
+    if (k <= 20) {
+      rig.with([&](protocol::HostFrameData& frame) {
+           frame.seeker = {{100.0 * t_s, 0.0, 50.0}, level};
+           frame.seeker_rates = protocol::PoseRates{{100.0, 0.0, 0.0}, glm::dvec3(0.0)};
+           frame.entity_count = 1;
+           frame.entities[0].entity_id = 7;
+           frame.entities[0].has_pose = true;
+           frame.entities[0].pose = {{entity_m(t_s), 0.0, 10.0}, level};
+           frame.entities[0].rates =
+               protocol::PoseRates{{10.0 + 40.0 * t_s, 0.0, 0.0}, glm::dvec3(0.0)};
+         })
+          .send(k, static_cast<std::int64_t>(k) * 10 * kMs);
+    }
+    rig.next_slot();
+  }
+  std::size_t judged = 0;
+  for (std::size_t i = 0; i + 1 < rig.frames.size(); ++i) {
+    const server::PublishFrame& frame = rig.frames[i];
+    const server::PublishFrame& next = rig.frames[i + 1];
+    if (frame.repeat || next.repeat || frame.header.host_frame_number == 0) continue;
+    const AheadImage& ahead = frame.image.ahead;
+    const glm::dvec3& now_m = frame.image.cameras[0].pose.position_world_m;
+    const glm::dvec3& ahead_m = frame.image.cameras[2].pose.position_world_m;
+    const glm::dvec3& next_m = next.image.cameras[0].pose.position_world_m;
+    // What the frame foresees is what the next frame shows, also where the host is silent.
+    EXPECT_EQ(ahead.sim_time_ns, next.header.sim_time_ns) << i;
+    EXPECT_NEAR(ahead_m.x, next_m.x, 1e-9) << i;
+    const std::int64_t by_ns = ahead.sim_time_ns - frame.header.sim_time_ns;
+    EXPECT_LE(by_ns, 10 * kMs);
+    if (by_ns < 10 * kMs) {
+      EXPECT_NE(frame.header.flags & protocol::kFlagExtrapolated, 0U) << i << " at the horizon";
+      EXPECT_NE(ahead.flags & protocol::kFlagStale, 0U) << i;
+      continue;
+    }
+    EXPECT_NEAR(ahead_m.x - now_m.x, 1.0, 1e-9) << i;
+    EXPECT_NE(ahead.flags & protocol::kFlagExtrapolated, 0U) << i;
+    const double t_s = 1e-9 * static_cast<double>(ahead.sim_time_ns);
+    // Acceleration is known from the third pose on.
+    if (i > 3) {
+      EXPECT_NEAR(frame.image.cameras[1].pose.position_world_m.x, entity_m(t_s), 1e-4) << i;
+      ++judged;
+    }
+  }
+  EXPECT_GT(judged, 10U);
+  ASSERT_GE(foreseen_m.size(), 20U);
+  for (std::size_t i = 2; i < foreseen_m.size(); i += 2) {
+    EXPECT_EQ(foreseen_m[i], foreseen_m[i + 1]) << "both cameras of a frame";
+    EXPECT_GT(foreseen_m[i], foreseen_m[i - 1]);
+  }
+  ASSERT_GE(rig.script.submitted.size(), 6U);
+  const auto& last = rig.script.submitted;
+  EXPECT_EQ(last[last.size() - 3].frame_number + 1, last[last.size() - 2].frame_number);
+  EXPECT_EQ(last[last.size() - 2].sim_time_ns, last[last.size() - 1].sim_time_ns);
+  EXPECT_EQ(last[last.size() - 2].thermal_time_ns, last[last.size() - 3].thermal_time_ns);
+  EXPECT_EQ(rig.script.held.load(), 0);
+}
+
+TEST(Cameras, ThatLookAheadNeedAClockAndAHorizon) {
+  config::DaemonConfig config;
+  config.file = "emitd.toml";
+  const scene::ScenarioDesc scenario = views_ahead();
+  const auto why = [&] {
+    const auto checked = check_look_ahead(scenario, config);
+    return checked ? std::string() : checked.error().text;
+  };
+  EXPECT_EQ(why(),
+            "emitd.toml: channel 'carried' of the scenario has 'look_ahead_frames', which needs "
+            "pacing.mode = \"ig-clock\" or \"trigger\"");
+  config.pacing.mode = config::PacingMode::trigger;
+  config.pacing.rate_hz = 100.0;
+  config.pacing.display_delay_ns = 20 * kMs;
+  config.pacing.horizon_ns = 30 * kMs;
+  EXPECT_EQ(why(), "");
+  config.pacing.horizon_ns = 29 * kMs;
+  EXPECT_EQ(why(),
+            "emitd.toml: channel 'carried' of the scenario has 'look_ahead_frames', which needs "
+            "pacing.horizon_ms of at least 30: 20 ms to the display and 10 ms ahead");
+}
+
 TEST(Cameras, AProjectorOfAMotionSimulatorFixesTheViewUnlessItHasItsOwn) {
   scene::ScenarioDesc scenario = four_views();
   EXPECT_FALSE(is_view_fixed(cameras_of(scenario, true))) << "none projects";

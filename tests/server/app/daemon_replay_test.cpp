@@ -349,6 +349,71 @@ TEST(DaemonReplayOfCameras, EveryImageHasTheSameBits) {
   }
 }
 
+/// Images that look ahead have the same bits again, and clients are told their instant.
+TEST(DaemonReplayOfCameras, ThatLookAheadHaveTheSameBits) {
+  ScratchFolder folder;
+  const std::string journal = folder.file("run.mcap");
+  scene::ScenarioDesc scenario;
+  scenario.name = "ahead";
+  scenario.bands = {{"8-12", 8.0, 12.0, {}}};
+  scenario.channels = {{"next", scene::ChannelKind::injection, "8-12"},
+                       {"now", scene::ChannelKind::injection, "8-12"}};
+  scenario.channels[0].camera.look_ahead_frames = 2;
+  SourceScript live_script;
+  std::size_t moved = 0;
+  {
+    auto config = configuration(config::PacingMode::ig_clock, journal);
+    config.pacing.horizon_ns = 1'000'000'000;
+    LiveDaemon live(config, live_script, scenario);
+    auto host = client::HostClient::connect(live.url);
+    auto next = client::FrameClient::connect(live.url);
+    ASSERT_TRUE(host.has_value() && next.has_value());
+    client::SubscribeOptions wanted;
+    wanted.channel_name = "next";
+    const auto channel = (*next)->subscribe(wanted);
+    ASSERT_TRUE(channel.has_value());
+    EXPECT_EQ(channel->look_ahead_frames, 2U);
+    for (std::uint64_t k = 1; k <= 40; ++k) {
+      protocol::HostFrameData frame;
+      frame.frame_number = k;
+      frame.run_id = 1;
+      frame.sim_time_ns = static_cast<std::int64_t>(k) * 5'000'000;
+      frame.seeker.position_world_m = {0.1 * static_cast<double>(k), -3.0, 200.0};
+      frame.entity_count = 1;
+      frame.entities[0].entity_id = 1;
+      frame.entities[0].has_pose = true;
+      frame.entities[0].pose.position_world_m.x = 0.3 * static_cast<double>(k);
+      ASSERT_TRUE((*host)->send(frame).has_value());
+      const auto received = (*next)->receive(kLongNs);
+      ASSERT_TRUE(received.has_value() && *received != nullptr);
+      const protocol::FrameHeader& header = (*received)->header;
+      if ((header.flags & (protocol::kFlagRepeated | protocol::kFlagStale)) != 0) continue;
+      // Two frames of 400 Hz: the pose is that of the later instant, at 20 m/s.
+      if (header.pose_sim_time_ns == 0 || header.predictions < 3) continue;
+      ++moved;
+      EXPECT_NEAR(header.pose.position_world_m.x, 20e-9 * static_cast<double>(header.sim_time_ns),
+                  1e-6);
+      EXPECT_NE(header.flags & protocol::kFlagExtrapolated, 0U);
+    }
+  }
+  EXPECT_GT(moved, 5U);
+  SourceScript script;
+  ScriptedSource source(script, 32, 16, 7);
+  JournalPlayer player(source, *make_channels(scenario, source.info()));
+  auto log = protocol::LogReader::open(journal);
+  ASSERT_TRUE(log.has_value()) << log.error().text;
+  for (auto more = log->next(); more && *more; more = log->next()) {
+    const auto frame = player.apply(log->journal());
+    ASSERT_TRUE(frame.has_value()) << frame.error().text;
+  }
+  EXPECT_GT(player.frames(), 20U);
+  EXPECT_EQ(player.mismatches(), 0U);
+  ASSERT_EQ(script.submitted.size(), live_script.submitted.size());
+  for (std::size_t i = 0; i < script.submitted.size(); ++i) {
+    EXPECT_EQ(script.submitted[i].sim_time_ns, live_script.submitted[i].sim_time_ns) << i;
+  }
+}
+
 /// The checksum of a frame is that of its first channel, with everything that is done to its
 /// picture, and the journal has the shift.
 TEST(JournalPlayer, MovesThePictureByTheShiftOfTheJournal) {

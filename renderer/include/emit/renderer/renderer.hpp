@@ -263,6 +263,13 @@ class Renderer {
   virtual std::size_t apply_entities(std::int64_t sim_time_ns,
                                      std::span<const EntityUpdate> updates) noexcept = 0;
 
+  /// Says where entities will be at `sim_time_ns`, for images of that instant before its poses have
+  /// come. Until the next apply_entities() an entity moves evenly from its newest pose to there.
+  /// The history of shade does not take it in. Updates of entities without a pose of the host, or
+  /// with one that is not older, have no effect. RT-safe.
+  virtual void foresee_entities(std::int64_t sim_time_ns,
+                                std::span<const EntityUpdate> updates) noexcept = 0;
+
   /// Drives a part of an entity from `sim_time_ns` on. The first command of a run replaces those of
   /// the scenario from there on. Returns false, and changes nothing, when no such part is in the
   /// scene or the time is before that of the part's newest command. RT-safe.

@@ -78,6 +78,7 @@ class Channel:
     window_width_px: int  # size of the part of the sensor's image that the frames show
     window_height_px: int
     output_step_bits: int  # what is done to the pixels, as in FrameHeader
+    look_ahead_frames: int = 0  # shows the scene so many frames later, as predicted
 
     def sensor_point(self, x_px: float, y_px: float) -> tuple[float, float] | None:
         """Returns the place in the sensor's image that a place of a frame shows.
@@ -111,7 +112,7 @@ class Channel:
         return Channel(info.index, info.name, info.kind, info.sensor, info.band, info.band_lo_um, info.band_hi_um,
                        info.width_px, info.height_px, max(info.every_nth, 1), info.window_x_px, info.window_y_px,
                        info.sensor_width_px, info.sensor_height_px, response, info.window_width_px or info.width_px,
-                       info.window_height_px or info.height_px, info.output_steps)
+                       info.window_height_px or info.height_px, info.output_steps, info.look_ahead_frames)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -74,5 +74,6 @@ inline constexpr Count kRingSlots{3, 1024};
 inline constexpr std::uint32_t kMaxFecData = 128;
 inline constexpr std::uint32_t kMaxFecParity = 32;
 inline constexpr std::uint32_t kMaxEveryNth = 1000;
+inline constexpr std::uint32_t kMaxLookAheadFrames = 8;
 
 }  // namespace emit::physics::limits

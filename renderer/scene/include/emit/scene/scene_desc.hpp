@@ -319,6 +319,7 @@ struct ChannelCamera {
   glm::dvec3 offset_body_m{0.0};                ///< from the seeker, or the entity, in its axes
   glm::dvec3 yaw_pitch_roll_rad{0.0};           ///< against the seeker's axes, or the entity's
   std::optional<std::uint32_t> entity_id = {};  ///< what carries it; none: the seeker
+  std::uint32_t look_ahead_frames = 0;          ///< its images show a later frame's instant
 
   [[nodiscard]] bool operator==(const ChannelCamera&) const = default;
 };

@@ -61,8 +61,9 @@ struct ChannelDescription {
   std::uint32_t height_px = 0;
   /// Spectral response of the band; empty: a perfect rectangle; absent: the daemon does not say.
   std::optional<std::vector<physics::ResponsePoint>> response = std::nullopt;
-  std::uint32_t every_nth = 1;    ///< shows frames 1, 1 + n, 1 + 2 n, ... of every run
-  std::uint32_t window_x_px = 0;  ///< where its image lies in the sensor's
+  std::uint32_t every_nth = 1;          ///< shows frames 1, 1 + n, 1 + 2 n, ... of every run
+  std::uint32_t look_ahead_frames = 0;  ///< shows the scene so many frames later, as predicted
+  std::uint32_t window_x_px = 0;        ///< where its image lies in the sensor's
   std::uint32_t window_y_px = 0;
   std::uint32_t sensor_width_px = 0;  ///< 0: the daemon does not say
   std::uint32_t sensor_height_px = 0;
