@@ -70,7 +70,7 @@ std::vector<Camera> cameras_of(const std::optional<scene::ScenarioDesc>& scenari
     found->channels |= ChannelSet{1} << (i % kMaxChannels);
   }
   if (cameras.empty()) cameras.emplace_back();
-  // What is foreseen of entities must not reach images of the frame's own instant.
+  // Images of the frame's own instant must not show entities where they are foreseen.
   std::ranges::stable_partition(cameras,
                                 [](const Camera& camera) { return !camera.looks_ahead(); });
   return cameras;
@@ -266,20 +266,20 @@ TakenPicture take_picture(Picture& picture, const renderer::FrameView& view,
   if (picture.chain) {
     std::vector<float>& made = picture.copies[slot];
     const std::uint32_t clamped_px = picture.chain->apply(plane, moment, made);
-    return {made, clamped_px};
+    return {made, clamped_px, picture.chain->cuts(moment)};
   }
   const scene::PixelRect& window = picture.window_px;
   const std::size_t first = std::size_t{window.y_px} * view.width_px + window.x_px;
   const std::size_t pixels = std::size_t{window.width_px} * window.height_px;
   if (picture.copies.empty()) {
-    return {plane.subspan(first, pixels), 0};
+    return {plane.subspan(first, pixels)};
   }
   std::vector<float>& copy = picture.copies[slot];
   for (std::size_t row = 0; row < window.height_px; ++row) {
     std::copy_n(plane.begin() + static_cast<std::ptrdiff_t>(first + row * view.width_px),
                 window.width_px, copy.begin() + static_cast<std::ptrdiff_t>(row * window.width_px));
   }
-  return {copy, 0};
+  return {copy};
 }
 
 physics::Result<void> check_look_ahead(const scene::ScenarioDesc& scenario,

@@ -118,6 +118,7 @@ struct ChannelTable {
 struct TakenPicture {
   std::span<const float> pixels;
   std::uint32_t clamped_px = 0;  ///< by its output
+  bool cut = false;              ///< its shift is larger than the room around its window
 };
 /// Returns the pixels of an image. They lie in the source's memory where they are in one piece
 /// there and nothing is done to them; else they are written to the image's memory for `slot`.

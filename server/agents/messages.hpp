@@ -166,7 +166,7 @@ struct CameraImage {
 inline constexpr std::uint32_t kCameraFlags = protocol::kFlagLate | protocol::kFlagDegraded |
                                               protocol::kFlagNonFinite | protocol::kFlagClamped;
 
-/// What a frame says to the channels that look ahead, in place of its header.
+/// Parts of a frame's header that are others for channels that look ahead.
 struct AheadImage {
   std::int64_t sim_time_ns = 0;
   std::int64_t display_ns = 0;      ///< 0: not known
@@ -187,6 +187,7 @@ struct Image {
   std::array<std::span<const float>, kMaxPictures> pictures;
   std::array<std::uint32_t, kMaxPictures> crc32c{};
   std::array<std::uint32_t, kMaxPictures> clamped_px{};  ///< by the outputs
+  std::array<bool, kMaxPictures> cut{};  ///< shifted further than there is room around them
   /// Shift by which the pictures that shift were moved, right and down in the sensor's image.
   glm::vec2 shift_px{0.0F};
   AheadImage ahead;  ///< where cameras look ahead

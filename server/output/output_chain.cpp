@@ -111,6 +111,11 @@ Result<OutputChain> OutputChain::make(const scene::ChannelOutput& settings, cons
     if (!source) return tl::unexpected(std::move(source.error()));
     const ImagePoint window_at{static_cast<double>(window_px.x_px - out.source_px_.x_px),
                                static_cast<double>(window_px.y_px - out.source_px_.y_px)};
+    out.room_before_px_ = {static_cast<float>(window_at.x_px), static_cast<float>(window_at.y_px)};
+    out.room_behind_px_ =
+        glm::vec2(static_cast<float>(out.source_px_.width_px - window_px.width_px),
+                  static_cast<float>(out.source_px_.height_px - window_px.height_px)) -
+        out.room_before_px_;
     out.map_.emplace(*source, out.steps_, window, window_at, part,
                      static_cast<float>(settings.outside_w_m2_sr));
     out.frame_ = out.map_->frame();
@@ -232,6 +237,14 @@ void OutputChain::turn_rows(std::span<const float> image, std::uint32_t first, s
       out[row * width + column] = *from;
     }
   }
+}
+
+bool OutputChain::cuts(const Moment& moment) const noexcept {
+  if ((steps_ & protocol::kOutputShifted) == 0) return false;
+  // The centre of an edge pixel may lie half a pixel beyond the middle of the last one.
+  const glm::vec2& shift_px = moment.shift_px;
+  return shift_px.x > room_before_px_.x + 0.5F || shift_px.y > room_before_px_.y + 0.5F ||
+         -shift_px.x > room_behind_px_.x + 0.5F || -shift_px.y > room_behind_px_.y + 0.5F;
 }
 
 std::uint32_t OutputChain::apply(std::span<const float> image, const Moment& moment,

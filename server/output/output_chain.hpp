@@ -64,6 +64,10 @@ class OutputChain {
   /// Returns how many pixels of a frame show nothing, whatever the shift is.
   [[nodiscard]] std::uint64_t outside_px() const noexcept { return map_ ? map_->outside_px() : 0; }
 
+  /// Returns whether a shift is larger than the room around the window, so that an edge of the
+  /// frame shows nothing.
+  [[nodiscard]] bool cuts(const Moment& moment) const noexcept;
+
   /// Writes a frame.
   /// @param image  radiance of the whole image, by row
   /// @param out    the frame, by row
@@ -86,6 +90,9 @@ class OutputChain {
   protocol::ImageSize frame_;
   std::uint16_t steps_ = 0;
   scene::PixelRect source_px_;  // without the margin of the spot
+  // Room around the window in it: to the left and above, to the right and below.
+  glm::vec2 room_before_px_{0.0F};
+  glm::vec2 room_behind_px_{0.0F};
   std::optional<SpotFilter> spot_;
   // Index in the image of the frame's first pixel, and of its neighbours to the right and below.
   std::ptrdiff_t turn_first_ = 0;

@@ -97,6 +97,7 @@ namespace emit::server {
   X(shift_feedback_dropped, "measurements the render agent did not take in time")          \
   X(output_px_clamped, "pixels outside the range of a channel's drive, counts or kelvin")  \
   X(output_shifts_unknown, "frames not shifted: no measurement of the axes was near")      \
+  X(output_shifts_cut, "pictures shifted further than there is room around them")          \
   X(axes_feedback_losses, "times its measurements stopped: motion.feedback_timeout_ms")    \
   X(axes_host_silences, "times no pose came for pacing.horizon_ms: its axes rest or park") \
   X(axes_interlocks, "times its interlock was open")                                       \

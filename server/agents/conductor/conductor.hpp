@@ -99,7 +99,7 @@ class Conductor final : public Agent {
   /// Finds where sensor and entities will be at the later instant that some cameras show, where
   /// there are such (conductor_cameras.cpp).
   void look_ahead(RenderJob& job, FrameLedger::Issued& issued) noexcept;
-  /// What cameras show: an instant with the seeker, the projector and the places of entities then.
+  /// An instant that cameras show, with the seeker, the projector and the places of entities then.
   struct Moment {
     physics::Pose seeker;
     glm::dmat3 world_from_projector{1.0};

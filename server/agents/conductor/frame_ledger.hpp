@@ -28,7 +28,7 @@ class FrameLedger {
       std::uint8_t faults = 0;  ///< protocol::MotionFaults
     };
     Motion motion;
-    /// What the images that look ahead show.
+    /// Later instant that the images that look ahead show.
     struct Ahead {
       AheadImage image;
       Motion motion;

@@ -377,6 +377,8 @@ void RenderAgent::take_pictures(const InFlight& frame, std::size_t camera,
     image.pictures[i] = taken.pixels;
     image.clamped_px[i] = taken.clamped_px;
     context_.counters.add(Counter::output_px_clamped, taken.clamped_px);
+    image.cut[i] = taken.cut;
+    if (taken.cut) context_.counters.add(Counter::output_shifts_cut);
     // Planes that share memory (canned frames) are summed once.
     const bool same = i > 0 && image.pictures[i].data() == image.pictures[i - 1].data() &&
                       image.pictures[i].size() == image.pictures[i - 1].size();

@@ -82,6 +82,7 @@ protocol::FrameHeader SenderClient::header_for(const Channel& channel,
     out.clamped_px += clamped_px;
     out.flags |= protocol::kFlagClamped;
   }
+  if (image.cut[channel.picture]) out.flags |= protocol::kFlagMotionFault;
   out.payload_bytes = image.pictures[channel.picture].size_bytes();
   out.payload_crc32c = image.crc32c[channel.picture];
   return out;

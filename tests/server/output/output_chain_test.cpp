@@ -276,6 +276,32 @@ TEST(OutputChain, AShiftBeyondTheImageShowsTheOutsideValue) {
   for (const float value : edge) EXPECT_EQ(value, 7.0F) << "half a pixel is within the edge";
 }
 
+TEST(OutputChain, AShiftCutsThePictureWhereAPixelShowsNothing) {
+  const ImageSize size{60, 50};
+  const auto image = image_of(size, [](double, double) { return 7.0; });
+  scene::ChannelOutput settings;
+  settings.apply_shift = true;
+  settings.outside_w_m2_sr = 1.0;
+  // One window has all its room, and one lies near two edges of the image.
+  for (const scene::PixelRect& window :
+       {scene::PixelRect{20, 20, 10, 8}, scene::PixelRect{3, 38, 50, 7}}) {
+    auto chain = OutputChain::make(settings, {size, window, 0.0});
+    ASSERT_TRUE(chain.has_value());
+    std::size_t cut = 0;
+    std::size_t whole = 0;
+    for (float x = -18.0F; x <= 18.0F; x += 0.75F) {
+      for (float y = -18.0F; y <= 18.0F; y += 0.75F) {
+        const std::vector<float> out = made(*chain, image, {x, y});
+        const bool empty = std::ranges::count(out, 1.0F) > 0;
+        ASSERT_EQ(chain->cuts({glm::vec2(x, y), 0}), empty) << x << ", " << y;
+        (empty ? cut : whole) += 1;
+      }
+    }
+    EXPECT_GT(cut, 100U);
+    EXPECT_GT(whole, 100U);
+  }
+}
+
 TEST(OutputChain, BrownsPolynomialMovesPixelsAsItsEquationSays) {
   const ImageSize size{40, 30};
   const auto source = PositionMap::brown(size, 50.0, {0.1, -0.02, 0.003}, {0.004, -0.005});

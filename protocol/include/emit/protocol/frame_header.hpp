@@ -82,7 +82,7 @@ enum FrameFlags : std::uint32_t {
   /// Set by a receiver: frames before this one were lost on the network.
   kFlagLostBefore = 1u << 14,
   /// The motion simulator does not show what the frame assumes: motion_state and motion_faults say
-  /// why.
+  /// why. Or the applied shift is larger than the room around the window.
   kFlagMotionFault = 1u << 15,
 };
 /// Names of the flags by bit, as docs/wire.md section 3 has them.
