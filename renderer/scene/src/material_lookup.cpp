@@ -205,6 +205,11 @@ std::vector<std::uint32_t> MaterialLookup::finish(SceneGeometry& geometry) {
     }
   }
   for (std::size_t i = 0; i < library_.size(); ++i) {
+    if (library_[i].clutter && !used_[i]) {
+      warnings_.push_back(fmt::format(
+          "{}: [[clutter]] of '{}' has no effect: nothing in the scene is of that material",
+          scenario_->file.string(), library_[i].name));
+    }
     if (used_[i] && !library_[i].dry_layers_valid && !library_[i].prescribed_k) {
       warnings_.push_back(fmt::format(
           "material '{}' is more than dry layers (dry_layers_valid = false): its "

@@ -228,6 +228,22 @@ TEST(LoadScene, evaporation_that_does_not_hold_is_warned_of) {
   EXPECT_THAT(scene->warnings[0], HasSubstr("emit2014"));
 }
 
+TEST(LoadScene, clutter_of_a_material_that_nothing_has_is_warned_of) {
+  ScenarioDesc scenario = one_triangle("", "");
+  scenario.materials.resize(2);
+  scenario.materials[0].name = "concrete";
+  scenario.materials[1].name = "grass";
+  scenario.materials[0].clutter.emplace();
+  scenario.default_material = "concrete";
+  auto scene = load_scene(scenario);
+  ASSERT_TRUE(scene.has_value()) << scene.error().text;
+  EXPECT_THAT(scene->warnings, Not(Contains(HasSubstr("[[clutter]]"))));
+  scenario.materials[1].clutter.emplace();
+  scene = load_scene(scenario);
+  ASSERT_TRUE(scene.has_value());
+  EXPECT_THAT(scene->warnings, Contains(AllOf(HasSubstr("[[clutter]] of 'grass' has no effect"))));
+}
+
 TEST(LoadScene, unknown_library_names_are_configuration_errors) {
   ScenarioDesc scenario = one_triangle();
   scenario.objects[0].material = "ashpalt";
