@@ -329,6 +329,7 @@ Result<std::vector<scene::Material>> load_materials(const std::filesystem::path&
     for (const Member& member : of_bands->members) bands.push_back(member.key);
   }
   auto materials = resolve_materials(nodes, bands, diagnostics);
+  check_glosses(nodes, {}, {}, materials, diagnostics);
   if (!diagnostics.empty()) return tl::unexpected<physics::Error>(diagnostics.error());
   return materials;
 }
@@ -397,8 +398,9 @@ Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
   scenario.atmosphere = resolve_atmosphere(root, scenario, diagnostics);
 
   scenario.materials = resolve_materials(pool.members[0].value.items, known, diagnostics);
-  resolve_clutter(root, scenario.thermal, known, scenario.materials, diagnostics);
+  check_glosses(pool.members[0].value.items, scenario, declared, scenario.materials, diagnostics);
   complete_band_emissivities(scenario.bands, scenario.materials);
+  resolve_clutter(root, scenario.thermal, known, scenario.materials, diagnostics);
   // The renderer gets only bands that a channel shows, and emissivities in those bands.
   std::vector<std::string> handed_over = known_band_names({});
   for (const scene::SpectralBand& band : scenario.bands) {

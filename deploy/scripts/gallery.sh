@@ -19,6 +19,7 @@ box            12600  320 240 all
 decoys         2.6    320 256 all
 engage         4      320 256 all
 ribbed         7200   320 256 all weather.file=
+sea            0      320 256 all
 statue         12600  320 240 day,dusk
 '
 # Condition: UTC of 21 June 2014, limits of the colours in K, sky, further keys. The sun is highest at

@@ -270,7 +270,9 @@ bool CachedStage::coarse_from(const physics::Pose& camera) const noexcept {
 }
 
 void CachedStage::describe(SceneStats& stats) const noexcept {
-  stats.samples = surface_->model().samples.samples.size();
+  // Twins of clutter stand at the places of others and do not count against the limit.
+  const SurfaceSamples& samples = surface_->model().samples;
+  stats.samples = samples.twinned.empty() ? samples.samples.size() : samples.first_twin;
   stats.sample_bytes = surface_->sample_bytes();
   stats.samples_full = surface_->model().full;
   stats.exchange_left_w_m2 = surface_->model().exchange_left_w_m2;

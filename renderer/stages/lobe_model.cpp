@@ -138,7 +138,7 @@ std::optional<LobeModel> LobeModel::build(const scene::ScenarioDesc& scenario,
     model.table_.push_back(static_cast<float>(facets.slope * facets.slope));
     model.table_.push_back(facets.slopes == physics::FacetSlopes::gaussian ? 1.0F : 0.0F);
     for (const scene::SpectralBand& band : scenario.bands) {
-      Lobe lobe = physics::make_lobe(facets, scene::facet_optics(materials[m], band));
+      Lobe lobe = physics::make_lobe(facets, scene::facet_optics(materials[m], facets, band));
       model.table_.push_back(static_cast<float>(lobe.diffuse_mean_frac));
       for (const LobeCurve* curve : {&lobe.emissivity_frac, &lobe.lobe_frac, &lobe.forward_ratio,
                                      &lobe.upward, &lobe.unmasked, &lobe.sun_facet}) {

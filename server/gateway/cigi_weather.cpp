@@ -19,6 +19,7 @@ namespace cigi = protocol::cigi;
 
 void CigiWeather::clear() noexcept {
   air_k_.reset();
+  humidity_frac_.reset();
   cover_frac_ = {};
   cloud_frac_.reset();
   stated_.reset();

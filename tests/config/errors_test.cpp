@@ -339,7 +339,14 @@ const std::vector<Case>& cases() {
        material("prescribed_k = 400\ngloss = { wavelength_um = [10], refractive_index = [3], "
                 "extinction_index = [0] }\n"),
        "s.toml:7:9: material 'x': 'emissivity_frac' of 0.900, which the heat balance uses, is more "
-       "than the interface of 'gloss' lets through over the hemisphere, 0.724"},
+       "than the interface of 'gloss' lets through over the hemisphere, 0.727"},
+      {"gloss_below_the_emissivity_of_an_own_band",
+       "[[band]]\nname = \"own\"\nlo_um = 8.5\nhi_um = 11\n" +
+           material("prescribed_k = 400\nband_emissivity_frac = { own = 0.99 }\n"
+                    "gloss = { wavelength_um = [10], refractive_index = [1.6], "
+                    "extinction_index = [0] }\n"),
+       "s.toml:12:9: material 'x': its emissivity of 0.990 in band 'own' is more than the "
+       "interface of 'gloss' lets through along the normal, 0.947"},
       {"wetness_above_1", material("base_k = 290\nwetness_frac = 1.5\n" + kLayer),
        "s.toml:7:16: 'wetness_frac' is 1.5, must be 0 .. 1"},
       {"resistance_below_0", material("base_k = 290\nsurface_resistance_s_m = -1\n" + kLayer),

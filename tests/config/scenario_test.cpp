@@ -668,6 +668,10 @@ TEST_F(ConfigTest, clutter_is_read_checked_and_printed) {
       {head + "emissivity_sd_frac = 0.05\n", "'emissivity_sd_frac' leads out of 0 to 1"},
       {head + "band_emissivity_sd_frac = { \"8-13\" = 0.001 }\n",
        "'band_emissivity_sd_frac': there is no band '8-13'"},
+      {"[[clutter]]\nmaterial = \"plain\"\nband_emissivity_sd_frac = { \"8-12\" = 0.1 }\n"
+       "[[material]]\nname = \"plain\"\nsolar_absorptance_frac = 0.5\nemissivity_frac = 0.95\n"
+       "prescribed_k = 300\n",
+       "'band_emissivity_sd_frac' leads out of 0 to 1"},
       {head + "inertia_sd_ln = 0.1\n" + head + "inertia_sd_ln = 0.2\n",
        "material 'concrete' has another [[clutter]] already"},
       {"[[clutter]]\nmaterial = \"shiny\"\nemissivity_sd_frac = 0.001\n[[material]]\nname = "

@@ -46,6 +46,7 @@ struct Hour {
   double beam_w_m2 = 0.0;
   double diffuse_w_m2 = 0.0;
   double rain_mm = 0.0;
+  double rain_h = 1.0;
 };
 
 /// A year whose sun comes from 7 h to 17 h, in whole numbers, and whose air warms by the hour.
@@ -74,9 +75,9 @@ std::string epw(const std::vector<Hour>& hours) {
   for (const Hour& h : hours) {
     out += fmt::format(
         "{},{},{},{},0,?9,{},-5,50,85000,0,0,{},0,{},{},0,0,0,0,180,3.5,5,5,20,20000,9,0,10,0,0,88,"
-        "0,{},1\n",
+        "0,{},{}\n",
         h.year, h.month, h.day, h.hour, h.air_c, h.longwave_w_m2, h.beam_w_m2, h.diffuse_w_m2,
-        h.rain_mm);
+        h.rain_mm, h.rain_h);
   }
   return out;
 }
@@ -198,6 +199,34 @@ TEST_F(ConfigTest, epw_rain_falls_in_its_hour) {
   const auto old = scenario(kScenario);
   ASSERT_TRUE(old) << old.error().text;
   EXPECT_TRUE(physics::RainDepth(old->weather).is_dry());
+}
+
+TEST_F(ConfigTest, epw_rain_of_several_hours_falls_over_them) {
+  auto hours = made_year();
+  for (Hour& h : hours) {
+    if (h.month != 6 || h.day != 21) continue;
+    // 6 mm from 6 h to 12 h, and 4 mm from 12 h to 18 h of which an hour states 1 mm for itself.
+    if (h.hour == 12) h.rain_mm = 6.0, h.rain_h = 6.0;
+    if (h.hour == 15) h.rain_mm = 1.0;
+    if (h.hour == 18) h.rain_mm = 4.0, h.rain_h = 6.0;
+    if (h.hour == 20) h.rain_mm = 2.0, h.rain_h = 99.0;  // its time is missing
+  }
+  write("w.epw", epw(hours));
+  const auto loaded = scenario(kScenario);
+  ASSERT_TRUE(loaded) << loaded.error().text;
+  const physics::RainDepth depth(loaded->weather);
+  const auto fallen_mm = [&](double from_h, double to_h) {
+    return depth.at_mm(std::llround(to_h * 3.6e12)) - depth.at_mm(std::llround(from_h * 3.6e12));
+  };
+  for (int hour = 6; hour < 12; ++hour) {
+    EXPECT_NEAR(fallen_mm(hour, hour + 1.0), 1.0, 1e-9) << hour;
+  }
+  EXPECT_NEAR(fallen_mm(12.0, 13.0), 0.5, 1e-9);
+  EXPECT_NEAR(fallen_mm(14.0, 15.0), 1.5, 1e-9);
+  EXPECT_NEAR(fallen_mm(12.0, 18.0), 4.0, 1e-9);
+  EXPECT_NEAR(fallen_mm(19.0, 20.0), 2.0, 1e-9);
+  EXPECT_THAT(loaded->warnings,
+              ::testing::Contains(::testing::HasSubstr("2 records state rain of more than 1 h")));
 }
 
 TEST_F(ConfigTest, planes_see_the_sun_of_a_year) {

@@ -176,6 +176,39 @@ TEST(Clutter, PicturesShowAFieldOfVarianceOneThatStaysOnTheGround) {
   EXPECT_LT(most, 0.05);
 }
 
+/// RMS of the field in the largest circle of a picture. A roll of the camera about the middle keeps
+/// the ground in it.
+double rms_in_circle(const std::vector<float>& values) {
+  std::vector<float> within;
+  for (std::size_t y = 0; y < kHeight; ++y) {
+    for (std::size_t x = 0; x < kWidth; ++x) {
+      const double right = static_cast<double>(x) + 0.5 - 0.5 * kWidth;
+      const double down = static_cast<double>(y) + 0.5 - 0.5 * kHeight;
+      if (std::hypot(right, down) < 0.5 * kHeight) within.push_back(values[y * kWidth + x]);
+    }
+  }
+  return rms_about_mean(within);
+}
+
+TEST(Clutter, KeepsItsContrastHoweverTheSensorRolls) {
+  scene::Clutter clutter = both();
+  clutter.shortest_m = 0.05;
+  clutter.longest_m = 0.8;
+  Eye eye(varied_ground(clutter, 400.0));
+  // At 7 degrees a pixel is eight times as long as it is wide.
+  const auto rolled = [&](double roll_deg) {
+    const physics::Pose pose{{0.0, -245.0, 30.0},
+                             physics::world_from_body_heading_pitch_roll(
+                                 0.0, -7.0 * physics::kDegree, roll_deg * physics::kDegree)};
+    return rms_in_circle(eye.show(2 * kHourNs, pose).sd);
+  };
+  const double upright = rolled(0.0);
+  EXPECT_GT(upright, 0.1);
+  for (const double roll_deg : {20.0, 45.0, 70.0, 90.0, 135.0}) {
+    EXPECT_NEAR(rolled(roll_deg) / upright, 1.0, 0.05) << roll_deg;
+  }
+}
+
 TEST(Clutter, WithoutSunOnlyTheEmissivityMatters) {
   scene::Clutter clutter = both();
   clutter.inertia_sd_ln = 0.0;

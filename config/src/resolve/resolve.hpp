@@ -17,6 +17,12 @@ namespace emit::config {
 [[nodiscard]] std::vector<Node> collect_material_nodes(
     const Node& root, const std::vector<std::filesystem::path>& libraries,
     Diagnostics& diagnostics);
+/// Reports emissivities that the facets of a gloss do not let through, in the built-in bands and
+/// those that the scenario declares. The weather of the scenario is read already.
+/// @param nodes  of the materials, in their order
+void check_glosses(const std::vector<Node>& nodes, const scene::ScenarioDesc& scenario,
+                   const std::vector<scene::SpectralBand>& declared,
+                   const std::vector<scene::Material>& materials, Diagnostics& diagnostics);
 [[nodiscard]] std::vector<scene::Material> resolve_materials(
     const std::vector<Node>& nodes, const std::vector<std::string>& known_bands,
     Diagnostics& diagnostics);

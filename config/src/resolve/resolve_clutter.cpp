@@ -43,6 +43,13 @@ void check(const Node& node, const Clutter& clutter, const Material& material,
                       fmt::format("'band_emissivity_sd_frac': there is no band '{}'{}", entry.band,
                                   did_you_mean(entry.band, known_bands)));
     }
+    // A band that the material does not list has its total emissivity, or that of a listed band
+    // which it overlaps.
+    if (std::ranges::find(material.band_emissivity, entry.band, &scene::BandEmissivity::band) ==
+        material.band_emissivity.end()) {
+      check_share(node, "band_emissivity_sd_frac", material.emissivity_frac, entry.value,
+                  diagnostics);
+    }
   }
   for (const scene::BandEmissivity& own : material.band_emissivity) {
     const auto listed =

@@ -113,9 +113,6 @@ void check_gloss(const Material& material, const Node& node, Diagnostics& diagno
   if (!material.gloss->sea && gloss.has("sea_wind_m_s")) {
     diagnostics.add(key_location(gloss, "sea_wind_m_s"), "'sea_wind_m_s' needs 'sea'");
   }
-  if (auto fits = scene::check_emissivities(material, built_in_bands()); !fits) {
-    diagnostics.add(gloss.at, fits.error().text);
-  }
 }
 
 void check_material(const Material& material, const Node& node,
@@ -226,6 +223,21 @@ std::vector<Material> resolve_materials(const std::vector<Node>& nodes,
     materials.push_back(std::move(material));
   }
   return materials;
+}
+
+void check_glosses(const std::vector<Node>& nodes, const scene::ScenarioDesc& scenario,
+                   const std::vector<scene::SpectralBand>& declared,
+                   const std::vector<Material>& materials, Diagnostics& diagnostics) {
+  std::vector<scene::SpectralBand> bands = built_in_bands();
+  bands.insert(bands.end(), declared.begin(), declared.end());
+  for (std::size_t i = 0; i < materials.size(); ++i) {
+    const Material& material = materials[i];
+    if (!material.gloss || !scene::validate(*material.gloss)) continue;
+    const physics::Facets facets = scene::facets_of(material, scenario);
+    if (auto fits = scene::check_emissivities(material, facets, bands); !fits) {
+      diagnostics.add(nodes[i].find("gloss")->at, fits.error().text);
+    }
+  }
 }
 
 }  // namespace emit::config

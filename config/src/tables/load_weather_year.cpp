@@ -60,6 +60,8 @@ const Field kDiffuse{"diffuse horizontal",
                      physics::limits::kDiffuseHorizontalWM2};
 const Field kRain{"liquid precipitation depth", &YearRecord::rain_mm, 1.0, 0.0, 999.0,
                   physics::limits::kRainMmH};
+const Field kRainHours{
+    "liquid precipitation quantity", &YearRecord::rain_h, 1.0, 0.0, 99.0, {0.0, 98.0}};
 
 /// Lines of a file with their numbers.
 class Lines {
@@ -251,6 +253,9 @@ Result<WeatherYear> read_epw(Lines lines) {
     if (read && cells.size() > kRainColumn) {
       read = take(lines, cells, kRainColumn, kRain, record);
     }
+    if (read && cells.size() > kRainColumn + 1) {
+      read = take(lines, cells, kRainColumn + 1, kRainHours, record);
+    }
     if (!read) return tl::unexpected<Error>(read.error());
     year.records.push_back(record);
   }
@@ -292,7 +297,8 @@ Result<WeatherYear> read_tmy3(Lines lines) {
   // Faces can do without the direction of the wind, and rain is often not recorded.
   for (const auto& [name, field] :
        {std::pair<std::string_view, const Field*>{"Wdir (degrees)", &kDirection},
-        {"Lprecip depth (mm)", &kRain}}) {
+        {"Lprecip depth (mm)", &kRain},
+        {"Lprecip quantity (hr)", &kRainHours}}) {
     const auto found = std::find(header.begin(), header.end(), name);
     if (found != header.end()) {
       columns.emplace_back(static_cast<std::size_t>(found - header.begin()), field);
@@ -314,6 +320,29 @@ Result<WeatherYear> read_tmy3(Lines lines) {
     year.records.push_back(record);
   }
   return year;
+}
+
+/// Spreads rain that fell over more than its record evenly over the records of its time. What these
+/// state for themselves is part of it, as in sums over six hours beside hourly rain.
+void spread_rain(WeatherYear& year) {
+  for (std::size_t i = 0; i < year.records.size(); ++i) {
+    YearRecord& last = year.records[i];
+    if (!last.rain_h || !(last.rain_mm.value_or(0.0) > 0.0)) continue;
+    const auto count =
+        std::min(static_cast<std::size_t>(std::lround(*last.rain_h / year.record_h)), i + 1);
+    if (count < 2) continue;
+    ++year.spread_rains;
+    const std::span<YearRecord> over(&year.records[i + 1 - count], count);
+    double stated_mm = 0.0;
+    for (const YearRecord& record : over.first(count - 1)) {
+      stated_mm += record.rain_mm.value_or(0.0);
+    }
+    const double rest_mm = std::max(0.0, *last.rain_mm - stated_mm);
+    last.rain_mm = 0.0;
+    for (YearRecord& record : over) {
+      record.rain_mm = record.rain_mm.value_or(0.0) + rest_mm / static_cast<double>(count);
+    }
+  }
 }
 
 /// Checks that every day is whole, and that the columns which nothing can replace hold something.
@@ -388,6 +417,7 @@ Result<WeatherYear> load_weather_year(const std::filesystem::path& file) {
   if (auto checked = check_year(file.string(), *year); !checked) {
     return tl::unexpected<Error>(checked.error());
   }
+  spread_rain(*year);
   return year;
 }
 

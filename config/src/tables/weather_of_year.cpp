@@ -334,6 +334,11 @@ std::vector<WeatherSample> weather_of_year(const WeatherYear& given, const std::
   }
   warn_of_place(year, name, scenario, warnings);
   warn_of_year(year, name, scenario, warnings);
+  if (year.spread_rains > 0) {
+    warnings.push_back(fmt::format(
+        "{}: {} records state rain of more than {:g} h; it is spread evenly over its time", name,
+        year.spread_rains, year.record_h));
+  }
   if (filled.values > 0) {
     warnings.push_back(fmt::format(
         "{}: {} missing values of air, dew point, wind or clouds are linear between others", name,

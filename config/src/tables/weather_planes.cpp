@@ -24,6 +24,7 @@ constexpr double kYearS = 365.0 * 86'400.0;
 struct RowsOfFile {
   std::vector<physics::WeatherSample> rows;
   WeatherOrigin origin;
+  std::vector<std::string> warnings;
   double from_s = 0.0;
   double to_s = 0.0;
 };
@@ -38,9 +39,8 @@ RowsOfFile rows_of_year(const WeatherYear& year, const std::string& name) {
   const auto days = sys_days(first / January / 1).time_since_epoch();
   scenario.epoch_utc_ns =
       duration_cast<std::chrono::nanoseconds>(days).count() - std::llround(year.zone_h * 3.6e12);
-  std::vector<std::string> warnings;
   RowsOfFile out;
-  out.rows = weather_of_year(year, name, scenario, warnings);
+  out.rows = weather_of_year(year, name, scenario, out.warnings);
   out.origin = {scenario.place, scenario.epoch_utc_ns};
   out.to_s = kYearS;
   return out;
@@ -60,8 +60,8 @@ Result<RowsOfFile> rows_of(const std::filesystem::path& file,
                                file.string() + ": a table has no place, which the scenario states");
   }
   const auto seconds = [](std::int64_t ns) { return static_cast<double>(ns) * 1e-9; };
-  return RowsOfFile{*rows, *origin, seconds(rows->front().sim_time_ns),
-                    seconds(rows->back().sim_time_ns)};
+  return RowsOfFile{
+      *rows, *origin, {}, seconds(rows->front().sim_time_ns), seconds(rows->back().sim_time_ns)};
 }
 
 glm::dvec3 normal_of(const WeatherPlane& plane) {
@@ -86,6 +86,7 @@ Result<PlaneCourse> weather_on_planes(const std::filesystem::path& file,
   const physics::GeoPlace place{physics::Radians(at.lat_rad), physics::Radians(at.lon_rad),
                                 physics::Metres(at.height_m)};
   PlaneCourse out;
+  out.warnings = found->warnings;
   out.sums.resize(planes.size());
   const auto count = static_cast<std::size_t>((found->to_s - found->from_s) / every_s + 1e-9) + 1;
   out.instants.reserve(count);

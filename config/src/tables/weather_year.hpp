@@ -33,6 +33,7 @@ struct YearRecord {
   std::optional<double> diffuse_horizontal_w_m2;
   /// Depth of liquid water that fell over the record; none: not stated, so that none fell.
   std::optional<double> rain_mm;
+  std::optional<double> rain_h;  ///< time over which it fell; none: the record
 };
 
 struct WeatherYear {
@@ -44,6 +45,7 @@ struct WeatherYear {
   double height_m = 0.0;
   double record_h = 1.0;
   std::vector<YearRecord> records;  ///< whole days, each from its first to its last record
+  std::size_t spread_rains = 0;     ///< records whose rain fell over more time than the record
 };
 
 /// Returns true for a file that begins as EPW or TMY3 do. A file that cannot be read is none.

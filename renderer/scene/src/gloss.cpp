@@ -8,6 +8,7 @@
 
 #include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
+#include "emit/physics/weather.hpp"
 
 namespace emit::scene {
 namespace {
@@ -97,7 +98,7 @@ physics::Result<void> validate(const Gloss& gloss) {
   return {};
 }
 
-physics::Result<void> check_emissivities(const Material& material,
+physics::Result<void> check_emissivities(const Material& material, const physics::Facets& facets,
                                          const std::vector<SpectralBand>& bands) {
   const auto fail = [&](std::string text) {
     return physics::make_error(physics::ErrorCode::invalid_argument,
@@ -108,7 +109,7 @@ physics::Result<void> check_emissivities(const Material& material,
     if (!listed) continue;
     const auto reflectance =
         interface_reflectance_frac(*material.gloss, spectral_band(band), kSurface);
-    const double most = 1.0 - reflectance.back();
+    const double most = physics::passed_frac(facets, reflectance).back();
     if (*listed > most + kNormalSlackFrac) {
       return fail(fmt::format(
           "its emissivity of {:.3f} in band '{}' is more than the interface of 'gloss' lets "
@@ -116,8 +117,8 @@ physics::Result<void> check_emissivities(const Material& material,
           *listed, band.name, most));
     }
   }
-  const double most = 1.0 - physics::hemispherical_mean(
-                                interface_reflectance_frac(*material.gloss, kThermal, kSurface));
+  const double most = physics::hemispherical_mean(physics::passed_frac(
+      facets, interface_reflectance_frac(*material.gloss, kThermal, kSurface)));
   if (material.emissivity_frac > most + kHemisphericalSlackFrac) {
     return fail(fmt::format(
         "'emissivity_frac' of {:.3f}, which the heat balance uses, is more than the interface of "
@@ -131,18 +132,19 @@ physics::Facets facets_of(const Material& material, const ScenarioDesc& scenario
   EMIT_CHECK(material.gloss.has_value());
   const Gloss& gloss = *material.gloss;
   if (!gloss.sea) return {physics::FacetSlopes::ggx, gloss.facet_slope};
-  double wind_m_s = scenario.clear_sky.wind_m_s;
-  if (!scenario.weather.empty()) {
-    wind_m_s = scenario.weather.front().wind_m_s;
-    for (const WeatherSample& row : scenario.weather) {
-      if (row.sim_time_ns <= 0) wind_m_s = row.wind_m_s;
-    }
-  }
-  return {physics::FacetSlopes::gaussian,
-          std::sqrt(physics::sea_mean_square_slope(gloss.sea_wind_m_s.value_or(wind_m_s)))};
+  return {physics::FacetSlopes::gaussian, std::sqrt(physics::sea_mean_square_slope(std::min(
+                                              sea_wind_m_s(gloss, scenario), kMostSeaWindMS)))};
 }
 
-physics::FacetOptics facet_optics(const Material& material, const SpectralBand& band) {
+double sea_wind_m_s(const Gloss& gloss, const ScenarioDesc& scenario) {
+  const bool table = !scenario.weather.empty();
+  return gloss.sea_wind_m_s.value_or(table
+                                         ? physics::forcing_from_rows(scenario.weather, 0).wind_m_s
+                                         : scenario.clear_sky.wind_m_s);
+}
+
+physics::FacetOptics facet_optics(const Material& material, const physics::Facets& facets,
+                                  const SpectralBand& band) {
   EMIT_CHECK(material.gloss.has_value());
   const physics::Band spectral = spectral_band(band);
   physics::FacetOptics out;
@@ -151,8 +153,8 @@ physics::FacetOptics facet_optics(const Material& material, const SpectralBand& 
       interface_reflectance_frac(*material.gloss, spectral, Kelvin(physics::kSunTemperatureK));
   out.lobe_frac = material.gloss->lobe_frac;
   const auto listed = listed_emissivity(material, band.name);
-  const double passed = listed ? 1.0 - out.reflectance_frac.back()
-                               : 1.0 - physics::hemispherical_mean(out.reflectance_frac);
+  const physics::LobeCurve all = physics::passed_frac(facets, out.reflectance_frac);
+  const double passed = listed ? all.back() : physics::hemispherical_mean(all);
   const double emitted = listed.value_or(material.emissivity_frac);
   out.body_absorptance_frac = passed > 0.0 ? std::min(1.0, emitted / passed) : 1.0;
   return out;

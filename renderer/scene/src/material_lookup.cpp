@@ -11,6 +11,7 @@
 #include "emit/physics/constants.hpp"
 #include "emit/physics/nearest_name.hpp"
 #include "emit/scene/base.hpp"
+#include "emit/scene/gloss_optics.hpp"
 
 namespace emit::scene {
 
@@ -209,6 +210,16 @@ std::vector<std::uint32_t> MaterialLookup::finish(SceneGeometry& geometry) {
       warnings_.push_back(fmt::format(
           "{}: [[clutter]] of '{}' has no effect: nothing in the scene is of that material",
           scenario_->file.string(), library_[i].name));
+    }
+    if (used_[i] && library_[i].gloss && library_[i].gloss->sea) {
+      const double wind_m_s = sea_wind_m_s(*library_[i].gloss, *scenario_);
+      if (wind_m_s > kMeasuredSeaWindMS) {
+        warnings_.push_back(fmt::format(
+            "{}: the sea of '{}' is in a wind of {:.1f} m/s; its slopes were measured up to {:g} "
+            "m/s, grow here up to {:g} m/s, and foam is left out",
+            scenario_->file.string(), library_[i].name, wind_m_s, kMeasuredSeaWindMS,
+            kMostSeaWindMS));
+      }
     }
     if (used_[i] && !library_[i].dry_layers_valid && !library_[i].prescribed_k) {
       warnings_.push_back(fmt::format(

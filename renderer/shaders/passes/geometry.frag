@@ -38,10 +38,16 @@ uvec4 packed_clutter() {
   vec2 place = level ? tile_position.xy : along ? tile_position.yz : tile_position.xz;
   vec2 a = level ? across.xy : along ? across.yz : across.xz;
   vec2 b = level ? down.xy : along ? down.yz : down.xz;
-  float size_a = dot(a, a);
-  float size_b = dot(b, b);
-  vec2 longer = size_a >= size_b ? a : b;
-  float width_frac = sqrt(min(size_a, size_b) / max(max(size_a, size_b), 1e-20));
+  // Take the axes of the pixel's footprint: the singular values of (a b), which a roll of the sensor does not change.
+  float along_x = a.x * a.x + b.x * b.x;
+  float along_y = a.y * a.y + b.y * b.y;
+  float mixed = a.x * a.y + b.x * b.y;
+  float apart = 0.5 * (along_x - along_y);
+  float longer2 = max(0.5 * (along_x + along_y) + sqrt(apart * apart + mixed * mixed), 1e-20);
+  vec2 axis = apart >= 0.0 ? vec2(longer2 - along_y, mixed) : vec2(mixed, longer2 - along_x);
+  float axis_length = length(axis);
+  vec2 longer = sqrt(longer2) * (axis_length > 0.0 ? axis / axis_length : vec2(1.0, 0.0));
+  float width_frac = min(abs(a.x * b.y - a.y * b.x) / longer2, 1.0);
   uvec2 steps = uvec2(fract(place) * EMIT_CLUTTER_PLACE_STEPS) << 8;
   return uvec4(steps.x | uint(width_frac * 255.0 + 0.5), steps.y | draw.field,
                packHalf2x16(clamp(longer, -60000.0, 60000.0)), packHalf2x16(clutter_k));

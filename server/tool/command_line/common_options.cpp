@@ -11,8 +11,8 @@
 
 namespace emit::tool {
 
-void add_json(CommandLine& line, std::optional<std::filesystem::path>& target) {
-  line.output_file("--json", target, "Write the results as JSON (- for standard output)");
+Option add_json(CommandLine& line, std::optional<std::filesystem::path>& target) {
+  return line.output_file("--json", target, "Write the results as JSON (- for standard output)");
 }
 
 void add_set(CommandLine& line, std::vector<std::string>& target) {

@@ -13,7 +13,7 @@
 namespace emit::tool {
 
 /// --json FILE, with "-" for standard output.
-void add_json(CommandLine& line, std::optional<std::filesystem::path>& target);
+Option add_json(CommandLine& line, std::optional<std::filesystem::path>& target);
 /// --set KEY=VALUE, repeatable.
 void add_set(CommandLine& line, std::vector<std::string>& target);
 /// The scenario under `name`, required, and --set.

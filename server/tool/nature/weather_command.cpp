@@ -325,6 +325,7 @@ int run_planes(const WeatherOptions& options) {
   const auto course =
       config::weather_on_planes(options.file, origin, options.planes, options.every_s);
   if (!course) return fail_call(course.error());
+  for (const std::string& warning : course->warnings) warn(warning);
   print_planes(text_stream(options.planes_csv), options, *course);
   if (!options.planes_csv) return kExitOk;
   const std::string text = planes_csv_text(options, *course);
@@ -389,9 +390,9 @@ void add_options(CommandLine& line, WeatherOptions& options) {
           "Scenario that takes the file: gives a CSV table its place and epoch, and adds what the "
           "scenario says about span, gaps, place and years")
       .type_name("SCENARIO");
-  line.output_file("--plot", options.plot, "Diagrams: SVG file");
-  add_json(line, options.json);
-  const Option planes =
+  const Option plot = line.output_file("--plot", options.plot, "Diagrams: SVG file");
+  const Option json = add_json(line, options.json);
+  Option planes =
       line.parsed(
               "--planes",
               [&options](const std::string& text) { return parse_planes(text, options.planes); },
@@ -399,12 +400,14 @@ void add_options(CommandLine& line, WeatherOptions& options) {
               "sun of a simulation. Azimuth of the normal clockwise from north, tilt from level, "
               "as 180:90,270:30. The ground reflects nothing, the sky is the same all over")
           .type_name("AZIMUTH:TILT,...");
+  planes.excludes(plot);
+  planes.excludes(json);
   line.output_file("--planes-csv", options.planes_csv,
                    "Instants of --planes: CSV file, in seconds of local standard time since 1 "
                    "January, of a table in simulation time")
       .needs(planes);
   line.option("--every", options.every_s, "Seconds between the instants of --planes")
-      .positive()
+      .in_range(1.0, 3600.0)
       .show_default()
       .needs(planes);
 }

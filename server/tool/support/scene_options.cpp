@@ -100,9 +100,10 @@ physics::Result<void> apply_scene_options(scenegen::GenerateOptions& options,
       const std::vector<std::string> known = keys_of(table);
       return make_error(
           ErrorCode::invalid_argument,
-          fmt::format("--set {}: unknown option '{}'{}; scene '{}' has the options {}", entry, key,
+          fmt::format("--set {}: unknown option '{}'{}; scene '{}' has {}", entry, key,
                       physics::did_you_mean(key, known), scenegen::to_string(options.kind),
-                      fmt::join(known, ", ")));
+                      known.empty() ? std::string("no options")
+                                    : fmt::format("the options {}", fmt::join(known, ", "))));
     }
     if (!found->second(std::string_view(entry).substr(equals + 1))) {
       return make_error(ErrorCode::invalid_argument,

@@ -77,6 +77,39 @@ TEST(CigiWeather, HumidityAndDirectionOfTheWindReachTheSurfaces) {
   EXPECT_NEAR(vapour_pa, physics::saturation_over_water_pa(scenario.clear_sky.dew_point_k), 0.01);
 }
 
+TEST(CigiWeather, ARunHasNothingOfTheOneBefore) {
+  const scene::ScenarioDesc scenario = scenario_at_noon();
+  CigiWeather fresh(&scenario);
+  CigiWeather used(&scenario);
+  cigi::AtmosphereControl air;
+  air.air_temperature_c = 35.0F;
+  air.humidity_percent = 95;
+  air.horizontal_wind_m_s = 9.0F;
+  air.wind_from_deg = 45.0F;
+  ASSERT_TRUE(used.take(air));
+  cigi::WeatherControl storm;
+  storm.layer_id = 2;
+  storm.enabled = true;
+  storm.coverage_percent = 100.0F;
+  ASSERT_TRUE(used.take(storm));
+  ASSERT_TRUE(used.take_change(0));
+  used.clear();
+  cigi::WeatherControl layer;
+  layer.layer_id = 1;
+  layer.enabled = true;
+  layer.coverage_percent = 50.0F;
+  ASSERT_TRUE(fresh.take(layer) && used.take(layer));
+  const auto expected = fresh.take_change(0);
+  const auto found = used.take_change(0);
+  ASSERT_TRUE(expected && found);
+  EXPECT_EQ(found->relative_humidity_frac, expected->relative_humidity_frac);
+  EXPECT_EQ(found->wind_from_deg, expected->wind_from_deg);
+  EXPECT_EQ(found->wind_m_s, expected->wind_m_s);
+  EXPECT_EQ(found->air_k, expected->air_k);
+  EXPECT_EQ(found->cloud_frac, expected->cloud_frac);
+  EXPECT_EQ(found->longwave_down_w_m2, expected->longwave_down_w_m2);
+}
+
 TEST(CigiWeather, KeepsWhatTheTableStatesBesidesItsColumns) {
   scene::ScenarioDesc scenario = scenario_at_noon();
   for (const std::int64_t hour : {0, 1, 2}) {

@@ -40,7 +40,8 @@ struct PlaneSum {
 };
 struct PlaneCourse {
   std::vector<PlaneInstant> instants;
-  std::vector<PlaneSum> sums;  ///< by plane
+  std::vector<PlaneSum> sums;         ///< by plane
+  std::vector<std::string> warnings;  ///< what was filled or left out, one sentence each
 };
 
 /// Computes what falls on planes at instants `every_s` apart: over the whole year of an EPW or TMY3

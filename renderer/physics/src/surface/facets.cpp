@@ -84,12 +84,22 @@ double hemispherical_mean(const LobeCurve& curve) noexcept {
   return sum;
 }
 
-Lobe make_lobe(const Facets& facets, const FacetOptics& optics) {
+namespace {
+
+/// What facets do whatever lies under them. `lobe` has its directions and the masking alone.
+struct Reflected {
+  Lobe lobe;
+  LobeCurve once{};    ///< share that facets reflect once
+  LobeCurve passed{};  ///< share that passes the interface
+};
+
+Reflected reflect(const Facets& facets, const LobeCurve& reflectance_frac) {
   EMIT_CHECK(facets.slope > 0.0 && facets.slope <= 1.0);
   const auto samples = slope_samples(facets);
-  Lobe out;
-  LobeCurve once{};    // reflected once, of an interface with the facets' reflectance
-  LobeCurve escape{};  // the same of one that reflects everything
+  Reflected all;
+  Lobe& out = all.lobe;
+  LobeCurve& once = all.once;
+  LobeCurve escape{};  // reflected once by an interface that reflects everything
   for (std::size_t node = 0; node < kLobeNodes; ++node) {
     const double cosine = lobe_view_cosine(node);
     const double sine = std::sqrt(1.0 - cosine * cosine);
@@ -112,7 +122,7 @@ Lobe make_lobe(const Facets& facets, const FacetOptics& optics) {
         const double to_z = 2.0 * facet_cosine / length - cosine;
         if (!(to_z > 0.0)) continue;  // it goes down, to another facet
         const double open = unmasked_both_frac(from, unmasked_frac(facets, to_z)) / from;
-        const double reflected = seen * open * lobe_at(optics.reflectance_frac, facet_cosine);
+        const double reflected = seen * open * lobe_at(reflectance_frac, facet_cosine);
         escape[node] += seen * open;
         once[node] += reflected;
         along += reflected * -to_x;
@@ -128,14 +138,28 @@ Lobe make_lobe(const Facets& facets, const FacetOptics& optics) {
   }
   // Light that facets send to each other comes out after further reflections.
   const double mean_escape = hemispherical_mean(escape);
-  const double mean_reflectance = hemispherical_mean(optics.reflectance_frac);
+  const double mean_reflectance = hemispherical_mean(reflectance_frac);
   const double several_frac = mean_reflectance * mean_reflectance * mean_escape /
                               (1.0 - mean_reflectance * (1.0 - mean_escape));
   for (std::size_t node = 0; node < kLobeNodes; ++node) {
     const double several = several_frac * (1.0 - escape[node]);
-    const double passed = 1.0 - once[node] - several;
-    out.lobe_frac[node] = optics.lobe_frac * once[node];
-    out.emissivity_frac[node] = passed * optics.body_absorptance_frac;
+    all.passed[node] = 1.0 - once[node] - several;
+  }
+  return all;
+}
+
+}  // namespace
+
+LobeCurve passed_frac(const Facets& facets, const LobeCurve& reflectance_frac) {
+  return reflect(facets, reflectance_frac).passed;
+}
+
+Lobe make_lobe(const Facets& facets, const FacetOptics& optics) {
+  const Reflected reflected = reflect(facets, optics.reflectance_frac);
+  Lobe out = reflected.lobe;
+  for (std::size_t node = 0; node < kLobeNodes; ++node) {
+    out.lobe_frac[node] = optics.lobe_frac * reflected.once[node];
+    out.emissivity_frac[node] = reflected.passed[node] * optics.body_absorptance_frac;
     out.diffuse_frac[node] = 1.0 - out.emissivity_frac[node] - out.lobe_frac[node];
     out.sun_facet[node] = optics.lobe_frac * optics.sun_reflectance_frac[node];
   }

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <vector>
 
 #include "support/emit_process.hpp"
 
@@ -46,6 +47,25 @@ TEST(CliWeather, refuses_what_it_cannot_read) {
   const ProcessResult result = run_emit({"weather", folder.file("w.csv")});
   EXPECT_EQ(result.exit_code, 78) << result.err;
   EXPECT_NE(result.err.find("w.csv"), std::string::npos) << result.err;
+}
+
+TEST(CliWeather, light_on_planes_is_no_report) {
+  const TemporaryFolder folder;
+  write_text(folder.file("w.csv"), kTable);
+  const std::vector<std::string> planes{"weather",       folder.file("w.csv"), "--scenario",
+                                        "block-on-road", "--planes",           "0:0,180:90"};
+  ProcessResult result = run_emit(planes);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  // The sky of the table brings 50 W/m2 for two hours to level ground and half of it to the wall.
+  EXPECT_NE(result.out.find("180, 90 deg"), std::string::npos) << result.out;
+  for (const std::vector<std::string>& more :
+       {std::vector<std::string>{"--plot", "p.svg"}, {"--json", "-"}, {"--every", "7200"}}) {
+    std::vector<std::string> line = planes;
+    line.insert(line.end(), more.begin(), more.end());
+    result = run_emit(line);
+    EXPECT_EQ(result.exit_code, 2) << more[0] << ": " << result.err;
+    EXPECT_NE(result.err.find(more[0]), std::string::npos) << result.err;
+  }
 }
 
 }  // namespace

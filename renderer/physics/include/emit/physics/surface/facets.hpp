@@ -88,6 +88,12 @@ struct Lobe {
   double hemispherical_emissivity_frac = 0.0;
   double diffuse_mean_frac = 0.0;  ///< hemispherical_mean() of diffuse_frac
 };
+/// Returns the share of light from each direction that passes the interface of rough facets, after
+/// further reflections between them too. It is what a black body under them absorbs and emits.
+/// @param reflectance_frac  of the interface, by the cosine of incidence on a facet
+/// @pre 0 < facets.slope <= 1
+[[nodiscard]] LobeCurve passed_frac(const Facets& facets, const LobeCurve& reflectance_frac);
+
 /// Integrates over the facets that a viewer sees. What they send to other facets counts as diffuse,
 /// in the amount that closes the energy (Kulla and Conty 2017).
 /// @pre 0 < facets.slope <= 1
