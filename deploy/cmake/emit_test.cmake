@@ -42,7 +42,7 @@ function(emit_test)
     target_precompile_headers(${arg_NAME} REUSE_FROM emit_test_headers)
   endif()
   set_target_properties(${arg_NAME} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/tests"
-    UNITY_BUILD ${EMIT_UNITY_BUILD} UNITY_BUILD_BATCH_SIZE 5)
+    UNITY_BUILD ${EMIT_UNITY_BUILD} UNITY_BUILD_BATCH_SIZE 12)
   set_source_files_properties(${arg_SEPARATE} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
   set(properties LABELS ${arg_LABEL} TIMEOUT ${arg_TIMEOUT})
   if(arg_SERIAL)
