@@ -27,12 +27,13 @@ if(EMIT_PRECOMPILED_HEADERS)
     <gmock/gmock.h> <gtest/gtest.h>)
 endif()
 
-# emit_test(NAME name LABEL label SOURCES ... [SEPARATE ...] LIBS ... [SERIAL] [TIMEOUT seconds])
+# emit_test(NAME name LABEL label SOURCES ... [SEPARATE ...] LIBS ... [SERIAL] [TIMEOUT seconds] [COST seconds])
 # One GoogleTest executable; each TEST becomes a CTest case carrying the label.
+# COST is about what the longest of its tests takes. CTest starts costly tests first, and knows no times in a new tree.
 # With EMIT_UNITY_BUILD a few sources at a time are compiled as one, as in emit_library. SEPARATE names those of SOURCES
 # that define the same private names as others.
 function(emit_test)
-  cmake_parse_arguments(arg "SERIAL" "NAME;LABEL;TIMEOUT" "SOURCES;SEPARATE;LIBS" ${ARGN})
+  cmake_parse_arguments(arg "SERIAL" "NAME;LABEL;TIMEOUT;COST" "SOURCES;SEPARATE;LIBS" ${ARGN})
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 300)
   endif()
@@ -45,6 +46,9 @@ function(emit_test)
     UNITY_BUILD ${EMIT_UNITY_BUILD} UNITY_BUILD_BATCH_SIZE 12)
   set_source_files_properties(${arg_SEPARATE} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
   set(properties LABELS ${arg_LABEL} TIMEOUT ${arg_TIMEOUT})
+  if(arg_COST)
+    list(APPEND properties COST ${arg_COST})
+  endif()
   if(arg_SERIAL)
     list(APPEND properties RUN_SERIAL TRUE)
   endif()

@@ -75,6 +75,8 @@ TEST(CliBench, ACrowdIsMeasuredBesideTheSceneWithoutIt) {
                                       "--set",       "thermal.spin_up_s=600",
                                       "--set",       "thermal.history_start_s=-600",
                                       "--set",       "thermal.shadow_map_px=256",
+                                      "--set",       "thermal.lateral=false",
+                                      "--set",       "thermal.exchange=false",
                                       "--set",       "sensor.width_px=32",
                                       "--set",       "sensor.height_px=24",
                                       "--json",      folder.file("c.json")});
@@ -124,7 +126,7 @@ TEST(CliBench, UncertaintyMovesEveryInputBothWays) {
   const TemporaryFolder folder;
   const ProcessResult run =
       run_emit({"bench", "uncertainty", "box", "--set", "thermal.tolerance_k=20", "--set",
-                "thermal.steps=6", "--set", "sensor.width_px=48", "--set", "sensor.height_px=36",
+                "thermal.steps=6", "--set", "sensor.width_px=24", "--set", "sensor.height_px=18",
                 "--json", folder.file("u.json"), "--plot", folder.file("u.svg")});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const std::string json = read_text(folder.file("u.json"));

@@ -73,7 +73,8 @@ TEST(KeptFacets, are_what_the_eyes_see_of_a_surface_that_bends) {
 
 TEST(KeptFacets, none_lies_where_the_sun_never_comes) {
   scene::SceneGeometry geometry = scene_of(scene::sphere(100, false));
-  const Count west = count_kept(geometry, kFacetPixelRad, glm::normalize(glm::vec3(-1.0F, 0.0F, 0.02F)));
+  const Count west =
+      count_kept(geometry, kFacetPixelRad, glm::normalize(glm::vec3(-1.0F, 0.0F, 0.02F)));
   EXPECT_GT(west.towards_eye, 0U);
   EXPECT_EQ(west.east, 0U);
   EXPECT_EQ(count_kept(geometry, kFacetPixelRad, {0.0F, 0.0F, -1.0F}).towards_eye, 0U);

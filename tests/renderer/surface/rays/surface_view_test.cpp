@@ -71,7 +71,8 @@ TEST(SurfaceView, shares_are_those_of_the_view) {
   scene.add_static(test::level_mesh({1.0F, -2.0F, 0.0F}, {4.0F, 2.0F, 0.0F}, 2.0F));
   const CasterRays casters = rays_through(scene);
   const ViewSampler sampler(256);
-  for (const glm::vec3& normal : {kZenith, glm::vec3(1.0F, 0.0F, 0.0F), glm::vec3(0.6F, 0.0F, 0.8F)}) {
+  for (const glm::vec3& normal :
+       {kZenith, glm::vec3(1.0F, 0.0F, 0.0F), glm::vec3(0.6F, 0.0F, 0.8F)}) {
     const ViewPoint point{glm::vec3(0.0F, 0.0F, 0.5F) - glm::vec3(casters.origin_world_m()), normal,
                           glm::vec3(0.0F), 1e-3F};
     const SurfaceView view = sampler.view(casters, point, {});

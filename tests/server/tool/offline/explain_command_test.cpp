@@ -116,7 +116,7 @@ TEST(CliExplain, the_pixel_is_that_of_the_picture_and_its_surface_has_a_history)
 TEST(CliExplain, the_sky_is_a_path_without_a_surface) {
   const TemporaryFolder folder;
   const ProcessResult result = explain("40,0", {"--set", "sensor.look_at_m=[-0.7,0.2,20]",
-                                                 "--hours", "0", "--json", folder.file("e.json")});
+                                                "--hours", "0", "--json", folder.file("e.json")});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const std::string json = read_text(folder.file("e.json"));
   EXPECT_NE(json.find("\"surface\": null"), std::string::npos) << json;

@@ -16,9 +16,10 @@ std::vector<std::string> render(const std::string& out, std::vector<std::string>
                                 int width_px = 80) {
   const std::string width = std::to_string(width_px);
   const std::string height = std::to_string(width_px * 4 / 5);
-  std::vector<std::string> arguments{
-      "render", "block-on-road",          "--out", out,
-      "--set",  "sensor.width_px=" + width, "--set", "sensor.height_px=" + height};
+  std::vector<std::string> arguments{"render", "block-on-road",
+                                     "--out",  out,
+                                     "--set",  "sensor.width_px=" + width,
+                                     "--set",  "sensor.height_px=" + height};
   arguments.insert(arguments.end(), more.begin(), more.end());
   return arguments;
 }
