@@ -13,7 +13,7 @@ namespace {
 
 constexpr const char* kScenario = "[atmosphere]\nfile = \"a.csv\"\nmodel = \"none\"\n";
 constexpr const char* kOneChannel = "[[channel]]\nname = \"c\"\nband = \"8-12\"\n";
-constexpr const char* kHeader =
+constexpr const char* kAtmosphereHeader =
     "band,range_m,elevation_deg,transmittance_frac,path_radiance_w_m2_sr\n";
 
 TEST_F(ConfigTest, an_atmosphere_table_becomes_a_grid_per_band) {
@@ -37,7 +37,7 @@ TEST_F(ConfigTest, an_atmosphere_table_becomes_a_grid_per_band) {
 }
 
 TEST_F(ConfigTest, an_atmosphere_table_is_printed_inline_and_reads_back) {
-  write("a.csv", std::string(kHeader) +
+  write("a.csv", std::string(kAtmosphereHeader) +
                      "8-12,100,-7.3,0.97,0.6\n8-12,2000,-7.3,0.6,9.1\n"
                      "8-12,100,48.56,0.98,0.5\n8-12,2000,48.56,0.7,8.2\n");
   const auto first = scenario(kScenario + std::string(kOneChannel));
@@ -95,7 +95,7 @@ class AtmosphereTableError : public ConfigTest,
 
 TEST_P(AtmosphereTableError, names_file_and_line) {
   const TableCase& test = table_cases()[GetParam()];
-  write("a.csv", kHeader + test.rows);
+  write("a.csv", kAtmosphereHeader + test.rows);
   EXPECT_EQ(scenario_error(kScenario + std::string(kOneChannel)),
             "s.toml:3:8: 'file': " + test.error);
 }
@@ -115,7 +115,7 @@ TEST_F(ConfigTest, an_atmosphere_table_names_its_missing_columns) {
 }
 
 TEST_F(ConfigTest, a_band_without_rows_is_named_unless_a_model_stands_in) {
-  write("a.csv", std::string(kHeader) + "8-12,100,0,0.9,1\n");
+  write("a.csv", std::string(kAtmosphereHeader) + "8-12,100,0,0.9,1\n");
   EXPECT_EQ(scenario_error("[atmosphere]\nfile = \"a.csv\"\n"),
             "s.toml:3:8: 'file': a.csv has no rows of band '3-5': add them, or name the 'model' "
             "that stands in for it");

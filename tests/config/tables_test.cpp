@@ -11,7 +11,7 @@ namespace emit::config::testing {
 namespace {
 
 constexpr const char* kWeather = "[weather]\nfile = \"w.csv\"\n";
-constexpr const char* kHeader =
+constexpr const char* kWeatherHeader =
     "time_s,dni_w_m2,dhi_w_m2,longwave_down_w_m2,air_k,wind_m_s,cloud_frac\n";
 
 TEST_F(ConfigTest, weather_is_read_with_columns_in_any_order) {
@@ -88,31 +88,31 @@ const std::vector<CsvCase>& csv_cases() {
       {"column_twice",
        "time_s,time_s,dni_w_m2,dhi_w_m2,longwave_down_w_m2,air_k,wind_m_s,cloud_frac\n",
        "w.csv:1:8: column 'time_s' appears twice"},
-      {"not_a_number", std::string(kHeader) + "0,8x0,100,330,290,2,0\n",
+      {"not_a_number", std::string(kWeatherHeader) + "0,8x0,100,330,290,2,0\n",
        "w.csv:2:3: 'dni_w_m2': '8x0' is not a number"},
-      {"decimal_comma", std::string(kHeader) + "0,\"8,5\",100,330,290,2,0\n",
+      {"decimal_comma", std::string(kWeatherHeader) + "0,\"8,5\",100,330,290,2,0\n",
        "w.csv:2:3: 'dni_w_m2': '8,5' is not a number; write '.' for the decimal point"},
-      {"date", std::string(kHeader) + "2014-06-21 06:00,0,100,330,290,2,0\n",
+      {"date", std::string(kWeatherHeader) + "2014-06-21 06:00,0,100,330,290,2,0\n",
        "w.csv:2:1: 'time_s': '2014-06-21 06:00' is not a number; dates"},
-      {"unix_time", std::string(kHeader) + "1403330400,0,100,330,290,2,0\n",
+      {"unix_time", std::string(kWeatherHeader) + "1403330400,0,100,330,290,2,0\n",
        "w.csv:2:1: 'time_s' is 1403330400, must be -1000000000 .. 1000000000; this looks like UNIX "
        "time in seconds (2014-06-21)"},
       {"utf_16", std::string("\xFF\xFEt\0i\0", 6), "w.csv: the file is UTF-16 text"},
       {"semicolons", "time_s;dni_w_m2\n0;1\n", "w.csv:1:1: cells are separated by ';'"},
-      {"indented_comment", "  # measured\n" + std::string(kHeader),
+      {"indented_comment", "  # measured\n" + std::string(kWeatherHeader),
        "w.csv:1:3: a comment has to begin in the first column"},
-      {"empty_value", std::string(kHeader) + "0,,100,330,290,2,0\n",
+      {"empty_value", std::string(kWeatherHeader) + "0,,100,330,290,2,0\n",
        "w.csv:2:3: 'dni_w_m2' is empty"},
-      {"out_of_range", std::string(kHeader) + "0,800,100,330,20,2,0\n",
+      {"out_of_range", std::string(kWeatherHeader) + "0,800,100,330,20,2,0\n",
        "w.csv:2:15: 'air_k' is 20, must be 180 .. 340"},
-      {"nan", std::string(kHeader) + "0,nan,100,330,290,2,0\n",
+      {"nan", std::string(kWeatherHeader) + "0,nan,100,330,290,2,0\n",
        "w.csv:2:3: 'dni_w_m2' is nan, must be 0 .. 2000"},
-      {"too_few_values", std::string(kHeader) + "# c\n0,800,100\n",
+      {"too_few_values", std::string(kWeatherHeader) + "# c\n0,800,100\n",
        "w.csv:3:1: 3 values, the header has 7"},
-      {"time_stands_still", std::string(kHeader) + "0,1,1,300,290,2,0\n0,1,1,300,290,2,0\n",
+      {"time_stands_still", std::string(kWeatherHeader) + "0,1,1,300,290,2,0\n0,1,1,300,290,2,0\n",
        "w.csv:3: 'time_s' is not later than in the row before"},
       {"empty_file", "", "w.csv: the file has no header row"},
-      {"header_alone", kHeader, "w.csv: the file has no rows"},
+      {"header_alone", kWeatherHeader, "w.csv: the file has no rows"},
   };
   return all;
 }
@@ -128,7 +128,7 @@ TEST_P(CsvError, names_file_and_line) {
 /// Test that a fault of every row gives one line.
 TEST_F(ConfigTest, faults_of_a_column_are_counted) {
   write("w.csv",
-        std::string(kHeader) + "1,x,100,330,90,2,0\n2,y,100,330,90,2,0\n3,z,1,330,90,2,0\n");
+        std::string(kWeatherHeader) + "1,x,100,330,90,2,0\n2,y,100,330,90,2,0\n3,z,1,330,90,2,0\n");
   EXPECT_EQ(scenario_error(kWeather),
             "s.toml:3:8: 'file': w.csv:2:3: 'dni_w_m2': 'x' is not a number (and 2 other rows)\n"
             "w.csv:2:13: 'air_k' is 90, must be 180 .. 340 (and 2 other rows)");
@@ -136,7 +136,7 @@ TEST_F(ConfigTest, faults_of_a_column_are_counted) {
 
 /// Test that tables as spreadsheets write them are read like plain ones.
 TEST_F(ConfigTest, weather_in_other_spellings_is_read_alike) {
-  const std::string plain = std::string(kHeader) + "0,800,100,330,290,2,0\n";
+  const std::string plain = std::string(kWeatherHeader) + "0,800,100,330,290,2,0\n";
   std::string cr = plain;
   std::replace(cr.begin(), cr.end(), '\n', '\r');
   for (const std::string& text :
@@ -162,7 +162,7 @@ TEST_F(ConfigTest, a_missing_weather_file_is_reported_where_it_is_named) {
 }
 
 TEST_F(ConfigTest, clear_sky_options_beside_a_table_are_refused) {
-  write("w.csv", std::string(kHeader) + "0,800,100,330,290,2,0\n");
+  write("w.csv", std::string(kWeatherHeader) + "0,800,100,330,290,2,0\n");
   EXPECT_EQ(scenario_error(std::string(kWeather) + "cloud_frac = 0.5\n"),
             "s.toml:4:1: 'cloud_frac' has no effect: the weather comes from a file");
 }

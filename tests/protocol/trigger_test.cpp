@@ -13,7 +13,7 @@ namespace emit::protocol {
 namespace {
 
 // Bytes of kTrigger, written by another program after docs/wire.md, CRC included.
-constexpr std::string_view kGolden =
+constexpr std::string_view kGoldenTrigger =
     "45464d54010000008877665544332211e8030000000000000500b49376e2fa18000000000afb71a5";
 
 constexpr Trigger kTrigger{0x1122334455667788, 1000, 1'800'000'000'000'000'005};
@@ -25,7 +25,7 @@ std::vector<std::byte> encoded(const Trigger& trigger) {
 }
 
 /// Returns the bytes of the trigger with one byte changed and a correct CRC.
-std::vector<std::byte> forged(std::size_t at, std::uint8_t value) {
+std::vector<std::byte> forged_trigger(std::size_t at, std::uint8_t value) {
   auto bytes = encoded(kTrigger);
   bytes[at] = std::byte{value};
   const std::uint32_t crc = crc32c(std::span(bytes).first(36));
@@ -47,9 +47,9 @@ TriggerFault fault_of(std::span<const std::byte> bytes) {
 }
 
 TEST(Trigger, EncodesToTheGoldenBytesAndBack) {
-  EXPECT_EQ(test::to_hex(encoded(kTrigger)), kGolden);
+  EXPECT_EQ(test::to_hex(encoded(kTrigger)), kGoldenTrigger);
   Trigger read;
-  ASSERT_EQ(decode_trigger(test::from_hex(kGolden), read), TriggerFault::none);
+  ASSERT_EQ(decode_trigger(test::from_hex(kGoldenTrigger), read), TriggerFault::none);
   EXPECT_EQ(read.run_id, kTrigger.run_id);
   EXPECT_EQ(read.number, kTrigger.number);
   EXPECT_EQ(read.edge_ns, kTrigger.edge_ns);
@@ -62,9 +62,9 @@ TEST(Trigger, RefusesWhatIsNone) {
   auto longer = good;
   longer.push_back(std::byte{0});
   EXPECT_EQ(fault_of(longer), TriggerFault::size);
-  EXPECT_EQ(fault_of(forged(3, 'R')), TriggerFault::magic);
-  EXPECT_EQ(fault_of(forged(4, 2)), TriggerFault::version);
-  EXPECT_EQ(fault_of(forged(31, 0x80)), TriggerFault::value) << "an instant before 1970";
+  EXPECT_EQ(fault_of(forged_trigger(3, 'R')), TriggerFault::magic);
+  EXPECT_EQ(fault_of(forged_trigger(4, 2)), TriggerFault::version);
+  EXPECT_EQ(fault_of(forged_trigger(31, 0x80)), TriggerFault::value) << "an instant before 1970";
   EXPECT_EQ(fault_of(encoded({0, 1, 0})), TriggerFault::value);
   EXPECT_EQ(fault_of(encoded({1, 0, 0})), TriggerFault::value);
   for (std::size_t at = 0; at < good.size(); ++at) {
@@ -72,7 +72,7 @@ TEST(Trigger, RefusesWhatIsNone) {
     flipped[at] ^= std::byte{0x10};
     EXPECT_NE(fault_of(flipped), TriggerFault::none) << "byte " << at;
   }
-  EXPECT_EQ(fault_of(forged(6, 0x55)), TriggerFault::none) << "reserved bytes are ignored";
+  EXPECT_EQ(fault_of(forged_trigger(6, 0x55)), TriggerFault::none) << "reserved bytes are ignored";
 }
 
 }  // namespace

@@ -5,10 +5,12 @@
 
 #include <cmath>
 
+#include "support/times.hpp"
+
 namespace emit::renderer {
 namespace {
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
+using test::kSecondNs;
 
 /// Returns an entity that flies east with that speed for an hour.
 scene::ObjectDesc flyer(double speed_m_s, double height_m) {

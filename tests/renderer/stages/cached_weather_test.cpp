@@ -35,13 +35,25 @@ scene::WeatherSample weather_at(const scene::ScenarioDesc& scenario, std::int64_
   return out;
 }
 
-/// Temperature of open ground under weather that the host sends, in steps that are short compared
-/// with its changes.
+/// Open ground under weather that the host sends, in steps that are short compared with its
+/// changes. The history up to the first sample is computed once.
+class ToldGround {
+ public:
+  ToldGround(const scene::ScenarioDesc& s, std::span<const scene::WeatherSample> told)
+      : ground_(s, told, told.front().sim_time_ns) {}
+  /// Returns the temperature at an instant that is not before the last one that was asked for.
+  double temperature_k(std::int64_t now_ns) {
+    while (ground_.at_ns() < now_ns) ground_.go_on(std::min(now_ns, ground_.at_ns() + kFrameNs));
+    return ground_.temperature_k();
+  }
+
+ private:
+  OpenGround ground_;
+};
+
 double told_ground_k(const scene::ScenarioDesc& s, std::span<const scene::WeatherSample> told,
                      std::int64_t now_ns) {
-  OpenGround ground(s, told, told.front().sim_time_ns);
-  while (ground.at_ns() < now_ns) ground.go_on(std::min(now_ns, ground.at_ns() + kFrameNs));
-  return ground.temperature_k();
+  return ToldGround(s, told).temperature_k(now_ns);
 }
 
 scene::ScenarioDesc open_ground() {
@@ -56,6 +68,7 @@ TEST(RendererCachedWeather, ACloudActsFromItsInstantOn) {
     SCOPED_TRACE(quarters);
     const std::int64_t event_ns = 2 * kHourNs + quarters * kFrameNs;
     const std::vector told{weather_at(scenario, event_ns, 0.0)};
+    ToldGround expected(scenario, told);
     Session run(scenario);
     std::int64_t now_ns = 2 * kHourNs + kFrameNs / 2;
     float last_k = run.frame_k(now_ns, pose)[kMiddle];
@@ -76,7 +89,7 @@ TEST(RendererCachedWeather, ACloudActsFromItsInstantOn) {
       ++after;
       EXPECT_EQ(run.coarse(), after <= 10) << after;
       if (after % 4 != 1) continue;
-      const double off_k = std::abs(is_k - told_ground_k(scenario, told, now_ns));
+      const double off_k = std::abs(is_k - expected.temperature_k(now_ns));
       most_off_k = std::max(most_off_k, off_k);
     }
     // Expect that the ground cools by kelvins meanwhile, while errors stay below a tenth.
@@ -127,6 +140,7 @@ TEST(RendererCachedWeather, RainActsFromItsInstantOn) {
   std::vector told{weather_at(scenario, event_ns, 1.0),
                    weather_at(scenario, event_ns + 40 * kSecondNs, 1.0)};
   told[0].rain_mm_h = 12.0;
+  ToldGround expected(scenario, told);
   Session run(scenario);
   std::int64_t now_ns = 2 * kHourNs + kFrameNs / 2;
   (void)run.frame_k(now_ns, pose);
@@ -141,7 +155,7 @@ TEST(RendererCachedWeather, RainActsFromItsInstantOn) {
     is_k = run.frame_k(now_ns, pose)[kMiddle];
     // The ground takes in a change over ten frames.
     if (now_ns < event_ns + 4 * kSecondNs || frame % 8 != 0) continue;
-    most_off_k = std::max(most_off_k, std::abs(is_k - told_ground_k(scenario, told, now_ns)));
+    most_off_k = std::max(most_off_k, std::abs(is_k - expected.temperature_k(now_ns)));
   }
   EXPECT_LT(most_off_k, 0.2);
   EXPECT_GT(open_ground_k(scenario, now_ns) - is_k, 1.5);
@@ -202,6 +216,7 @@ TEST(RendererCachedWeather, WhatIsToldTwiceForOneInstantIsTheLatter) {
   const auto pose = looking({0.0, -0.01, 12.0}, {0.0, 0.0, 0.0});
   const std::int64_t event_ns = 2 * kHourNs + 15 * kSecondNs;
   const std::vector told{weather_at(scenario, event_ns, 0.9), weather_at(scenario, event_ns, 0.0)};
+  ToldGround expected(scenario, std::span(told).last(1));
   Session run(scenario);
   float before_k = 0.0F;
   for (std::int64_t now_ns = 2 * kHourNs; now_ns < event_ns; now_ns += kFrameNs) {
@@ -217,7 +232,7 @@ TEST(RendererCachedWeather, WhatIsToldTwiceForOneInstantIsTheLatter) {
       EXPECT_NEAR(is_k, before_k, 0.02);
     }
     if (f % 10 == 0) {
-      EXPECT_NEAR(is_k, told_ground_k(scenario, std::span(told).last(1), now_ns), 0.06) << f;
+      EXPECT_NEAR(is_k, expected.temperature_k(now_ns), 0.06) << f;
     }
   }
 }

@@ -26,7 +26,7 @@ using test::DaemonProcess;
 using test::ScratchFolder;
 
 using emit::test::kLongNs;
-constexpr std::uint64_t kFrames = 40;
+constexpr std::uint64_t kNetworkFrames = 40;
 
 std::string config_at(const std::string& host, const std::string& pacing) {
   std::string text = canned_config(320, 256, pacing);
@@ -118,10 +118,10 @@ std::string port_of(const std::string& address) {
   return address.substr(address.rfind(':'));
 }
 
-/// Takes frames until kFrames came, and checks that all are complete and none is lost.
+/// Takes frames until kNetworkFrames came, and checks that all are complete and none is lost.
 void expect_frames(client::FrameClient& client) {
   std::uint64_t newest = 0;
-  for (std::uint64_t i = 0; i < kFrames; ++i) {
+  for (std::uint64_t i = 0; i < kNetworkFrames; ++i) {
     const auto frame = client.receive(kLongNs);
     ASSERT_TRUE(frame.has_value()) << frame.error().text;
     ASSERT_NE(*frame, nullptr) << "no frame";

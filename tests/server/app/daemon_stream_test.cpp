@@ -17,9 +17,9 @@ using test::DaemonProcess;
 using test::ScratchFolder;
 
 #if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
-constexpr std::uint64_t kFrames = 200;
+constexpr std::uint64_t kStreamFrames = 200;
 #else
-constexpr std::uint64_t kFrames = 1000;
+constexpr std::uint64_t kStreamFrames = 1000;
 #endif
 using emit::test::kLongNs;
 
@@ -77,7 +77,7 @@ TEST(DaemonStream, AStoppedClientCostsTheOthersNothingOverTcpAndUdp) {
 
   // The test is the slowest link of the chain: every frame is taken before the next is requested.
   // So missing frames were lost by emitd and not by a busy machine.
-  for (std::uint64_t k = 1; k <= kFrames; ++k) {
+  for (std::uint64_t k = 1; k <= kStreamFrames; ++k) {
     protocol::HostFrameData frame;
     frame.frame_number = k;
     frame.run_id = 1;
@@ -89,26 +89,26 @@ TEST(DaemonStream, AStoppedClientCostsTheOthersNothingOverTcpAndUdp) {
       ASSERT_TRUE(udp.take(kLongNs)) << "frame " << k;
       ASSERT_EQ(udp.newest, k);
     }
-    if (k < kFrames / 3 || k > 2 * kFrames / 3) {
+    if (k < kStreamFrames / 3 || k > 2 * kStreamFrames / 3) {
       tcp_stopped.drain();
       udp_stopped.drain();
     }
   }
-  EXPECT_EQ(tcp.complete, kFrames);
+  EXPECT_EQ(tcp.complete, kStreamFrames);
   EXPECT_EQ(tcp.client->counters().lost, 0U);
   EXPECT_EQ(tcp.client->counters().gaps, 0U);
   EXPECT_EQ(tcp.client->counters().crc_errors, 0U);
   if (udp_has_room) {
-    EXPECT_EQ(udp.complete, kFrames);
+    EXPECT_EQ(udp.complete, kStreamFrames);
     EXPECT_EQ(udp.client->counters().lost, 0U);
     EXPECT_EQ(udp.client->counters().crc_errors, 0U);
     EXPECT_EQ(udp.client->counters().os_drops, 0U);
   }
   // The clients that stood still get the newest frames again, and every gap of the source's own is
   // announced.
-  while (tcp_stopped.newest < kFrames && tcp_stopped.take(kLongNs)) {
+  while (tcp_stopped.newest < kStreamFrames && tcp_stopped.take(kLongNs)) {
   }
-  EXPECT_EQ(tcp_stopped.newest, kFrames);
+  EXPECT_EQ(tcp_stopped.newest, kStreamFrames);
   EXPECT_GT(tcp_stopped.client->counters().skipped, 0U) << "it was stopped for long enough";
   EXPECT_EQ(tcp_stopped.client->counters().lost, 0U);
   EXPECT_EQ(tcp_stopped.client->counters().crc_errors, 0U);
@@ -195,11 +195,11 @@ TEST(DaemonStream, AtItsOwn200HzNothingIsLostUnflagged) {
     bool stopped = false;
     while (watcher.take(kLongNs)) {
       first = first == 0 ? watcher.newest : first;
-      if (stops && !stopped && watcher.newest > first + kFrames / 2) {
+      if (stops && !stopped && watcher.newest > first + kStreamFrames / 2) {
         stopped = true;
         std::this_thread::sleep_for(std::chrono::seconds(2));
       }
-      if (watcher.newest >= first + kFrames) {
+      if (watcher.newest >= first + kStreamFrames) {
         break;
       }
     }

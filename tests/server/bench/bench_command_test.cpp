@@ -74,8 +74,11 @@ TEST(CliBench, ACrowdIsMeasuredBesideTheSceneWithoutIt) {
                                       "--set",       "thermal.steps=3",
                                       "--set",       "thermal.spin_up_s=600",
                                       "--set",       "thermal.history_start_s=-600",
-                                      "--set",       "sensor.width_px=64",
-                                      "--set",       "sensor.height_px=48",
+                                      "--set",       "thermal.shadow_map_px=256",
+                                      "--set",       "thermal.lateral=false",
+                                      "--set",       "thermal.exchange=false",
+                                      "--set",       "sensor.width_px=32",
+                                      "--set",       "sensor.height_px=24",
                                       "--json",      folder.file("c.json")});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const std::string json = read_text(folder.file("c.json"));
@@ -109,8 +112,8 @@ TEST(CliBench, GasIsMeasuredBesideTheSceneWithoutIt) {
   const TemporaryFolder folder;
   const ProcessResult run = run_emit(
       {"bench", "gas", "--pairs", "15", "--set", "thermal.tolerance_k=50", "--set",
-       "thermal.steps=3", "--set", "thermal.history_start_s=-600", "--set", "sensor.width_px=64",
-       "--set", "sensor.height_px=48", "--json", folder.file("g.json")});
+       "thermal.steps=3", "--set", "thermal.history_start_s=-600", "--set", "sensor.width_px=24",
+       "--set", "sensor.height_px=18", "--json", folder.file("g.json")});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const std::string json = read_text(folder.file("g.json"));
   EXPECT_EQ(json_value(json, "suite"), "\"gas\"");
@@ -123,7 +126,7 @@ TEST(CliBench, UncertaintyMovesEveryInputBothWays) {
   const TemporaryFolder folder;
   const ProcessResult run =
       run_emit({"bench", "uncertainty", "box", "--set", "thermal.tolerance_k=20", "--set",
-                "thermal.steps=6", "--set", "sensor.width_px=48", "--set", "sensor.height_px=36",
+                "thermal.steps=6", "--set", "sensor.width_px=24", "--set", "sensor.height_px=18",
                 "--json", folder.file("u.json"), "--plot", folder.file("u.svg")});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const std::string json = read_text(folder.file("u.json"));

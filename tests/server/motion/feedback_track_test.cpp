@@ -6,10 +6,12 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "support/times.hpp"
+
 namespace emit::server {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
 
 /// A cubic motion of all axes, which the track must give back exactly.
 AxisFeedback feedback_at(std::int64_t time_ns) {

@@ -16,8 +16,8 @@ std::vector<std::string> render(const std::string& out, std::vector<std::string>
   std::vector<std::string> arguments{"render",   "box",
                                      "--time-s", "12600",
                                      "--out",    out,
-                                     "--set",    "sensor.width_px=160",
-                                     "--set",    "sensor.height_px=120",
+                                     "--set",    "sensor.width_px=80",
+                                     "--set",    "sensor.height_px=60",
                                      "--set",    "thermal.steps=5"};
   arguments.insert(arguments.end(), more.begin(), more.end());
   return arguments;
@@ -202,8 +202,8 @@ TEST(CliSolve, a_few_pixels_by_layers_alone) {
                                          "--dimension", "1",
                                          "--pixels",    "40",
                                          "--rays",      "64",
-                                         "--set",       "sensor.width_px=160",
-                                         "--set",       "sensor.height_px=120",
+                                         "--set",       "sensor.width_px=80",
+                                         "--set",       "sensor.height_px=60",
                                          "--set",       "thermal.model=foster",
                                          "--out",       folder.file("truth.exr"),
                                          "--json",      folder.file("truth.json")});
@@ -371,8 +371,8 @@ TEST(CliGenerate, the_example_of_its_help_works) {
 TEST(CliBench, paper_fills_every_key) {
   const TemporaryFolder folder;
   const ProcessResult result =
-      run_emit({"bench", "paper", "--scene", "box", "--steps", "5", "--width", "160", "--height",
-                "120", "--pixels", "2000", "--json", folder.file("paper.json")},
+      run_emit({"bench", "paper", "--scene", "box", "--steps", "5", "--width", "80", "--height",
+                "60", "--pixels", "500", "--json", folder.file("paper.json")},
                std::chrono::seconds(280));
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const std::string json = read_text(folder.file("paper.json"));
@@ -416,7 +416,7 @@ TEST(CliBench, paper_fills_every_key) {
   for (const char* stage : {"geometry", "occlusion", "shadow", "thermal", "radiance", "readback"}) {
     sum += std::stod(json_value(json, stage));
   }
-  EXPECT_EQ(json_value(json, "pixels_compared"), "4000");  // two images
+  EXPECT_EQ(json_value(json, "pixels_compared"), "1000");  // two images
   EXPECT_EQ(json_value(json, "not_finite_px"), "0");
   const double rms_k = std::stod(json_value(json, "rms_error_k"));
   EXPECT_GT(rms_k, 0.01);  // five steps are not enough
@@ -424,7 +424,7 @@ TEST(CliBench, paper_fills_every_key) {
   EXPECT_GE(std::stod(json_value(json, "max_error_k")), std::stod(json_value(json, "p99_error_k")));
   EXPECT_NE(json_value(json, "reference").find("1440 uniform history steps"), std::string::npos);
   EXPECT_GT(std::stod(json_value(json, "embree_ratio")), 0.0);
-  EXPECT_NE(result.err.find("errors of 2000 pixels, the rule is 20000"), std::string::npos);
+  EXPECT_NE(result.err.find("errors of 500 pixels, the rule is 20000"), std::string::npos);
   const double serial_ms = std::stod(json_value(json, "frame_serial_ms"));
   EXPECT_GT(serial_ms, 0.0);
   EXPECT_NEAR(sum, serial_ms, 1e-9 * serial_ms);  // the same numbers in another order of rounding
@@ -433,12 +433,12 @@ TEST(CliBench, paper_fills_every_key) {
 TEST(CliBench, paper_meets_no_rules_with_small_pictures) {
   const TemporaryFolder folder;
   const ProcessResult result =
-      run_emit({"bench", "paper", "--scene", "box", "--steps", "14", "--width", "160", "--height",
-                "120", "--method", "cached", "--no-errors", "--json", folder.file("paper.json")});
+      run_emit({"bench", "paper", "--scene", "box", "--steps", "14", "--width", "80", "--height",
+                "60", "--method", "cached", "--no-errors", "--json", folder.file("paper.json")});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(json_value(read_text(folder.file("paper.json")), "rules_met"), "false");
   // A slow machine has lines of progress beside it.
-  const std::string warning = "emit: warning: pictures of 160x120, the rule is 1024x768 at least\n";
+  const std::string warning = "emit: warning: pictures of 80x60, the rule is 1024x768 at least\n";
   const std::size_t at = result.err.find(warning);
   ASSERT_NE(at, std::string::npos) << result.err;
   EXPECT_EQ(result.err.find("emit: ", at + 1), std::string::npos) << "nothing else is wrong";

@@ -16,7 +16,7 @@ namespace {
 
 const std::array<glm::dvec3, 2> kEyes{glm::dvec3(0.0, 0.0, 5.0), glm::dvec3(0.0, 0.5, 5.0)};
 /// The sphere's triangles look about two pixels wide.
-constexpr double kPixelRad = 3e-3;
+constexpr double kFacetPixelRad = 3e-3;
 
 scene::SceneGeometry scene_of(scene::Mesh mesh) {
   scene::SceneGeometry geometry;
@@ -61,7 +61,7 @@ Count count_kept(const scene::SceneGeometry& geometry, double pixel_rad,
 
 TEST(KeptFacets, are_what_the_eyes_see_of_a_surface_that_bends) {
   const scene::SceneGeometry geometry = scene_of(scene::sphere(100, false));
-  const Count kept = count_kept(geometry, kPixelRad);
+  const Count kept = count_kept(geometry, kFacetPixelRad);
   // The visible cap is 40 % of the sphere's surface. Facets near its rim that look too slim are not
   // kept.
   const std::size_t all = geometry.meshes[0].indices.size() / 3;
@@ -73,10 +73,11 @@ TEST(KeptFacets, are_what_the_eyes_see_of_a_surface_that_bends) {
 
 TEST(KeptFacets, none_lies_where_the_sun_never_comes) {
   scene::SceneGeometry geometry = scene_of(scene::sphere(100, false));
-  const Count west = count_kept(geometry, kPixelRad, glm::normalize(glm::vec3(-1.0F, 0.0F, 0.02F)));
+  const Count west =
+      count_kept(geometry, kFacetPixelRad, glm::normalize(glm::vec3(-1.0F, 0.0F, 0.02F)));
   EXPECT_GT(west.towards_eye, 0U);
   EXPECT_EQ(west.east, 0U);
-  EXPECT_EQ(count_kept(geometry, kPixelRad, {0.0F, 0.0F, -1.0F}).towards_eye, 0U);
+  EXPECT_EQ(count_kept(geometry, kFacetPixelRad, {0.0F, 0.0F, -1.0F}).towards_eye, 0U);
 }
 
 TEST(KeptFacets, none_hides_behind_something_else) {
@@ -91,23 +92,23 @@ TEST(KeptFacets, none_hides_behind_something_else) {
   geometry.static_bounds.add(plate.world_bounds);
   geometry.bounds.add(plate.world_bounds);
   const glm::vec3 to_sun = glm::normalize(glm::vec3(0.0F, 5.0F, 0.5F));
-  const Count kept = count_kept(geometry, kPixelRad, to_sun);
+  const Count kept = count_kept(geometry, kFacetPixelRad, to_sun);
   EXPECT_GT(kept.towards_eye, 0U);
   EXPECT_EQ(kept.east, 0U);
   geometry.instances[1].world_from_mesh = glm::translate(glm::dmat4(1.0), glm::dvec3(0, 0, 9));
-  EXPECT_GT(count_kept(geometry, kPixelRad, to_sun).east, 0U);
+  EXPECT_GT(count_kept(geometry, kFacetPixelRad, to_sun).east, 0U);
 }
 
 TEST(KeptFacets, none_is_finer_than_a_pixel_or_part_of_a_plane) {
-  EXPECT_EQ(count_kept(scene_of(scene::sphere(100, false)), 3.0 * kPixelRad).towards_eye, 0U);
-  EXPECT_EQ(count_kept(scene_of(test::grid_mesh(60)), kPixelRad).towards_eye, 0U);
+  EXPECT_EQ(count_kept(scene_of(scene::sphere(100, false)), 3.0 * kFacetPixelRad).towards_eye, 0U);
+  EXPECT_EQ(count_kept(scene_of(test::grid_mesh(60)), kFacetPixelRad).towards_eye, 0U);
 }
 
 TEST(KeptFacets, are_those_of_a_mirrored_instance_too) {
   scene::SceneGeometry geometry = scene_of(scene::sphere(100, false));
-  const Count before = count_kept(geometry, kPixelRad);
+  const Count before = count_kept(geometry, kFacetPixelRad);
   geometry.instances[0].world_from_mesh = glm::scale(glm::dmat4(1.0), glm::dvec3(-1.0, 1.0, 1.0));
-  const Count kept = count_kept(geometry, kPixelRad);
+  const Count kept = count_kept(geometry, kFacetPixelRad);
   EXPECT_EQ(kept.away, 0U);
   EXPECT_NEAR(static_cast<double>(kept.towards_eye), static_cast<double>(before.towards_eye),
               0.02 * static_cast<double>(before.towards_eye));

@@ -73,11 +73,11 @@ scene::SceneGeometry waves(float unit_m = 1.0F) {
 }
 
 const std::array<glm::dvec3, 1> kEyes{glm::dvec3(0.0, -8.0, 13.0)};
-constexpr double kPixelRad = 1e-3;
+constexpr double kDetailPixelRad = 1e-3;
 
 scene::SceneGeometry coarse_waves(float unit_m = 1.0F) {
   scene::SceneGeometry full = waves(unit_m);
-  const std::vector<double> errors = scene::simplify_errors(full, {kEyes, kPixelRad});
+  const std::vector<double> errors = scene::simplify_errors(full, {kEyes, kDetailPixelRad});
   return scene::simplified(std::move(full), errors);
 }
 
@@ -131,7 +131,7 @@ float normals_error(bool with_detail, double left_out, float unit_m = 1.0F) {
                          make_foster(scenario, std::move(*networks), environment, kReferenceK));
   StepPlan plan(scenario.thermal);
   RefineView view;
-  view.pixel_rad = kPixelRad;
+  view.pixel_rad = kDetailPixelRad;
   for (const glm::dvec3& eye : kEyes) view.eyes.push_back({eye, {}});
   if (!(*surface)->prepare(7200 * kSecondNs, view, {environment, {}}, plan, history, std::nullopt,
                            {})) {

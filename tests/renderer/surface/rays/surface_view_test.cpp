@@ -19,9 +19,9 @@ namespace {
 
 using test::SurfaceScene;
 
-constexpr glm::vec3 kUp{0.0F, 0.0F, 1.0F};
+constexpr glm::vec3 kZenith{0.0F, 0.0F, 1.0F};
 
-CasterRays rays_of(const SurfaceScene& scene) {
+CasterRays rays_through(const SurfaceScene& scene) {
   auto rays = CasterRays::create(scene.geometry);
   if (!rays) throw std::runtime_error(rays.error().text);
   return std::move(*rays);
@@ -69,9 +69,10 @@ TEST(SurfaceView, shares_are_those_of_the_view) {
   SurfaceScene scene;
   scene.add_static(ground());
   scene.add_static(test::level_mesh({1.0F, -2.0F, 0.0F}, {4.0F, 2.0F, 0.0F}, 2.0F));
-  const CasterRays casters = rays_of(scene);
+  const CasterRays casters = rays_through(scene);
   const ViewSampler sampler(256);
-  for (const glm::vec3& normal : {kUp, glm::vec3(1.0F, 0.0F, 0.0F), glm::vec3(0.6F, 0.0F, 0.8F)}) {
+  for (const glm::vec3& normal :
+       {kZenith, glm::vec3(1.0F, 0.0F, 0.0F), glm::vec3(0.6F, 0.0F, 0.8F)}) {
     const ViewPoint point{glm::vec3(0.0F, 0.0F, 0.5F) - glm::vec3(casters.origin_world_m()), normal,
                           glm::vec3(0.0F), 1e-3F};
     const SurfaceView view = sampler.view(casters, point, {});
@@ -84,7 +85,7 @@ TEST(SurfaceView, shares_are_those_of_the_view) {
 TEST(SurfaceView, shares_of_a_free_face_are_exact) {
   SurfaceScene scene;
   scene.add_static(test::level_mesh(glm::vec3(-1.0F), glm::vec3(1.0F), 0.0F));
-  const CasterRays casters = rays_of(scene);
+  const CasterRays casters = rays_through(scene);
   const ViewSampler sampler(1024);
   for (float tilt_rad = 0.0F; tilt_rad < 3.0F; tilt_rad += 0.1F) {
     const ViewPoint point{{9000.0F, 0.0F, 50.0F},
@@ -100,7 +101,7 @@ TEST(SurfaceView, shares_of_a_free_face_are_exact) {
 TEST(SurfaceView, shares_tell_what_a_turn_of_the_face_changes) {
   SurfaceScene scene;
   scene.add_static(ground());
-  const CasterRays casters = rays_of(scene);
+  const CasterRays casters = rays_through(scene);
   const ViewSampler sampler(1024);
   const auto at = [&](float tilt_rad) {
     const ViewPoint point{glm::vec3(0.0F, 0.0F, 0.5F) - glm::vec3(casters.origin_world_m()),
@@ -120,7 +121,7 @@ TEST(SurfaceView, shares_tell_what_a_turn_of_the_face_changes) {
 TEST(SurfaceView, the_opening_of_a_free_face_gives_the_sky_of_every_attitude) {
   SurfaceScene scene;
   scene.add_static(test::level_mesh(glm::vec3(-1.0F), glm::vec3(1.0F), 0.0F));
-  const CasterRays casters = rays_of(scene);
+  const CasterRays casters = rays_through(scene);
   const ViewOpening opening = ViewSampler(1024).opening(
       casters,
       {.position_m = {0.0F, 0.0F, 500.0F}, .normal = glm::normalize(glm::vec3(1.0F, 2.0F, 2.0F))},
@@ -128,7 +129,7 @@ TEST(SurfaceView, the_opening_of_a_free_face_gives_the_sky_of_every_attitude) {
   EXPECT_EQ(opening.open_frac, 1.0F);
   // Compare with the view factor of a tilted plane, (1 + cos tilt) / 2.
   for (const glm::vec3& up :
-       {kUp, -kUp, glm::vec3(1.0F, 0.0F, 0.0F), glm::vec3(0.6F, 0.0F, 0.8F)}) {
+       {kZenith, -kZenith, glm::vec3(1.0F, 0.0F, 0.0F), glm::vec3(0.6F, 0.0F, 0.8F)}) {
     const float cosine = glm::dot(up, glm::normalize(glm::vec3(1.0F, 2.0F, 2.0F)));
     EXPECT_NEAR(0.5F * opening.open_frac + glm::dot(opening.tilt_frac, up), 0.5F * (1.0F + cosine),
                 1e-6F);
@@ -139,7 +140,7 @@ TEST(SurfaceView, the_opening_at_the_foot_of_a_wall_gives_the_sky_to_a_tenth) {
   SurfaceScene scene;
   scene.add_static(ground());
   scene.add_static(test::box_mesh(glm::vec3(0.0F, -5e3F, 0.0F), glm::vec3(1.0F, 5e3F, 5e3F)));
-  const CasterRays casters = rays_of(scene);
+  const CasterRays casters = rays_through(scene);
   ViewPoint foot{.inward = {-1.0F, 0.0F, 0.0F}, .offset_m = 2e-3F};
   foot.position_m -= glm::vec3(casters.origin_world_m());
   const ViewOpening opening = ViewSampler(1024).opening(casters, foot, {});
@@ -149,8 +150,8 @@ TEST(SurfaceView, the_opening_at_the_foot_of_a_wall_gives_the_sky_to_a_tenth) {
   };
   // Upright, all that is open is sky. With the wall below it is too, but the second order
   // gives only 1/4 + 1/(2 pi).
-  EXPECT_NEAR(sky_frac(kUp), 0.5F, 0.01F);
-  EXPECT_NEAR(sky_frac(-kUp), 0.0F, 0.01F);
+  EXPECT_NEAR(sky_frac(kZenith), 0.5F, 0.01F);
+  EXPECT_NEAR(sky_frac(-kZenith), 0.0F, 0.01F);
   EXPECT_NEAR(sky_frac({-1.0F, 0.0F, 0.0F}), 0.5F, 0.1F);
   EXPECT_NEAR(sky_frac({0.0F, 1.0F, 0.0F}), 0.25F, 0.01F);
 }
@@ -158,7 +159,7 @@ TEST(SurfaceView, the_opening_at_the_foot_of_a_wall_gives_the_sky_to_a_tenth) {
 TEST(SurfaceView, open_ground_sees_the_sky_alone) {
   SurfaceScene scene;
   scene.add_static(ground());
-  const CasterRays casters = rays_of(scene);
+  const CasterRays casters = rays_through(scene);
   for (const std::uint32_t rays : {1U, 64U, 100U, 256U, 1000U}) {
     const SurfaceView view = view_of(casters, {.position_m = {3.0F, 2.0F, 0.0F}}, rays);
     EXPECT_EQ(view.sky_frac, 1.0F);
@@ -166,7 +167,7 @@ TEST(SurfaceView, open_ground_sees_the_sky_alone) {
     EXPECT_EQ(view.seen_count, 0U);
   }
   // The underside looks away from the sky, and nothing is there.
-  const SurfaceView below = view_of(casters, {.normal = -kUp});
+  const SurfaceView below = view_of(casters, {.normal = -kZenith});
   EXPECT_EQ(below.far_frac, 1.0F);
 }
 
@@ -175,7 +176,7 @@ TEST(SurfaceView, the_foot_of_a_wall_sees_half_of_the_sky) {
   scene.add_static(ground());
   const std::uint32_t wall =
       scene.add_static(test::box_mesh(glm::vec3(0.0F, -5e3F, 0.0F), glm::vec3(1.0F, 5e3F, 5e3F)));
-  const CasterRays casters = rays_of(scene);
+  const CasterRays casters = rays_through(scene);
   const ViewPoint foot{.inward = {-1.0F, 0.0F, 0.0F}, .offset_m = 2e-3F};
   for (const std::uint32_t rays : {64U, 256U}) {
     const SurfaceView view = view_of(casters, foot, rays);
@@ -193,7 +194,7 @@ TEST(SurfaceView, the_foot_of_a_wall_sees_half_of_the_sky) {
   EXPECT_NEAR(view.sky_frac, 0.5F, 0.01F);
   EXPECT_NEAR(instance_frac(view, 0), 0.5, 0.01);
   scene.geometry.instances.erase(scene.geometry.instances.begin());
-  const SurfaceView bare = view_of(rays_of(scene), middle);
+  const SurfaceView bare = view_of(rays_through(scene), middle);
   EXPECT_EQ(bare.sky_frac, view.sky_frac);
   EXPECT_NEAR(bare.far_frac, 0.5F, 0.01F);
 }
@@ -203,7 +204,7 @@ TEST(SurfaceView, a_plate_overhead_takes_its_view_factor) {
   scene.add_static(ground());
   const std::uint32_t plate =
       scene.add_static(test::level_mesh(glm::vec3(-2.0F), glm::vec3(2.0F), 1.5F));
-  const CasterRays casters = rays_of(scene);
+  const CasterRays casters = rays_through(scene);
   const std::array<glm::dvec3, 4> corners = {glm::dvec3(-2, -2, 1.5), glm::dvec3(2, -2, 1.5),
                                              glm::dvec3(2, 2, 1.5), glm::dvec3(-2, 2, 1.5)};
   std::mt19937 random(2);
@@ -230,7 +231,7 @@ TEST(SurfaceView, ground_beside_a_cube_sees_its_near_face) {
   scene.add_static(ground());
   const std::uint32_t cube =
       scene.add_static(test::box_mesh(glm::vec3(0.0F, -1.0F, 0.0F), glm::vec3(2.0F, 1.0F, 2.0F)));
-  const CasterRays casters = rays_of(scene);
+  const CasterRays casters = rays_through(scene);
   const std::array<glm::dvec3, 4> face = {glm::dvec3(0, -1, 0), glm::dvec3(0, 1, 0),
                                           glm::dvec3(0, 1, 2), glm::dvec3(0, -1, 2)};
   for (const float distance_m : {0.05F, 0.3F, 1.0F, 3.0F}) {
@@ -248,7 +249,7 @@ TEST(SurfaceView, inside_a_body_all_rays_end_on_its_back_faces) {
   SurfaceScene scene;
   scene.add_static(test::box_mesh(glm::vec3(-1.0F), glm::vec3(1.0F)));
   const SurfaceView view =
-      view_of(rays_of(scene), {.normal = glm::normalize(glm::vec3(1.0F, 2.0F, -0.5F))});
+      view_of(rays_through(scene), {.normal = glm::normalize(glm::vec3(1.0F, 2.0F, -0.5F))});
   EXPECT_EQ(view.sky_frac + view.far_frac, 0.0F);
   EXPECT_EQ(view.seen_count, SurfaceView::kMaxSeen);
   EXPECT_NEAR(total_frac(view), 1.0, 1e-5);
@@ -263,7 +264,7 @@ TEST(SurfaceView, joined_hits_keep_objects_sides_and_places) {
     const auto y = static_cast<float>(i - 4);
     scene.add_static(test::box_mesh(glm::vec3(1.0F, y, 0.0F), glm::vec3(2.0F, y + 1.0F, 4.0F)));
   }
-  const CasterRays casters = rays_of(scene);
+  const CasterRays casters = rays_through(scene);
   ViewPoint point{.position_m = {0.0F, 0.3F, 1.0F}, .normal = {1.0F, 0.0F, 0.0F}};
   const SurfaceView view = view_of(casters, point);
   EXPECT_EQ(view.seen_count, SurfaceView::kMaxSeen);
@@ -296,7 +297,7 @@ TEST(SurfaceView, an_entity_is_seen_where_it_stands) {
   scene.add_static(ground());
   const std::uint32_t entity =
       scene.add_entity(test::level_mesh(glm::vec3(-1e3F), glm::vec3(1e3F), 0.0F));
-  const CasterRays casters = rays_of(scene);
+  const CasterRays casters = rays_through(scene);
   EntityPlacement placement{glm::mat3(1.0F), {0.0F, 0.0F, 1.0F}, true};
   const ViewSampler sampler(64);
   EXPECT_NEAR(instance_frac(sampler.view(casters, {}, {true, {&placement, 1}}), entity), 1.0, 1e-5);

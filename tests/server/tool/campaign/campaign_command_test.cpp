@@ -14,7 +14,7 @@ namespace {
 
 constexpr const char* kHead = R"(
 scenario = "box"
-set = ["sensor.width_px=64", "sensor.height_px=48", "thermal.steps=5"]
+set = ["sensor.width_px=32", "sensor.height_px=24", "thermal.steps=5"]
 times = "09:30,10:30"
 )";
 

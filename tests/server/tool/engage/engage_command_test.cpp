@@ -20,10 +20,12 @@ namespace {
 using ::testing::HasSubstr;
 constexpr std::chrono::seconds kEngageLimit{280};
 
-/// The scene is coarse and the image a part of the usual one, which keeps llvmpipe quick.
+/// The scene is coarse, its history is short, and the image is a part of the usual one, which keeps
+/// llvmpipe quick.
 std::vector<std::string> coarse(std::vector<std::string> arguments) {
   for (const char* set :
        {"thermal.max_samples=20000", "thermal.tolerance_k=30", "thermal.shadow_map_px=256",
+        "thermal.history_start_s=-600", "thermal.steps=5", "thermal.spin_up_s=3600",
         "sensor.width_px=160", "sensor.height_px=128", "sensor.fov_h_deg=4"}) {
     arguments.emplace_back("--set");
     arguments.emplace_back(set);

@@ -13,8 +13,9 @@ namespace {
 
 using Arguments = std::vector<std::string>;
 
-const Arguments kScene{"block-on-road", "--set", "sensor.width_px=320", "--set",
-                       "sensor.height_px=256"};
+constexpr std::size_t kWidth = 80;
+const Arguments kScene{"block-on-road", "--set", "sensor.width_px=80", "--set",
+                       "sensor.height_px=64"};
 
 ProcessResult explain(const std::string& px, const Arguments& more) {
   Arguments arguments{"explain", "--time-s", "12600", "--px", px};
@@ -58,8 +59,8 @@ TEST(CliExplain, the_terms_add_up_to_the_pixel_through_air_of_every_kind_and_ove
   for (std::size_t a = 0; a < airs.size(); ++a) {
     // A lit roof, a wall, the road and its shadow; without built-in air one pixel suffices.
     const std::vector<std::string> pixels =
-        a == 0 ? std::vector<std::string>{"160,128", "40,200", "300,140", "200,60"}
-               : std::vector<std::string>{"40,200"};
+        a == 0 ? std::vector<std::string>{"40,32", "10,50", "75,35", "50,15"}
+               : std::vector<std::string>{"10,50"};
     for (const std::string& px : pixels) {
       SCOPED_TRACE(std::to_string(a) + " at " + px);
       Arguments more{"--hours", "0", "--json", folder.file("e.json")};
@@ -86,7 +87,7 @@ TEST(CliExplain, the_terms_add_up_to_the_pixel_through_air_of_every_kind_and_ove
 TEST(CliExplain, the_pixel_is_that_of_the_picture_and_its_surface_has_a_history) {
   const TemporaryFolder folder;
   const ProcessResult result =
-      explain("300,140", {"--json", folder.file("e.json"), "--html", folder.file("e.html")});
+      explain("75,35", {"--json", folder.file("e.json"), "--html", folder.file("e.html")});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const std::string json = read_text(folder.file("e.json"));
   Arguments render{"render", "--time-s", "12600", "--out", folder.file("f.exr")};
@@ -94,7 +95,7 @@ TEST(CliExplain, the_pixel_is_that_of_the_picture_and_its_surface_has_a_history)
   ASSERT_EQ(run_emit(render).exit_code, 0);
   const auto frame = image::read_exr(folder.file("f.exr"));
   ASSERT_TRUE(frame.has_value()) << frame.error().text;
-  const std::size_t px = 140U * 320U + 300U;
+  const std::size_t px = 35U * kWidth + 75U;
   EXPECT_EQ(static_cast<float>(number(bands_of(json).at(0), "pixel_w_m2_sr")),
             frame->find("radiance")->pixels[px]);
   EXPECT_EQ(static_cast<float>(number(json, "temperature_k")),
@@ -114,8 +115,8 @@ TEST(CliExplain, the_pixel_is_that_of_the_picture_and_its_surface_has_a_history)
 
 TEST(CliExplain, the_sky_is_a_path_without_a_surface) {
   const TemporaryFolder folder;
-  const ProcessResult result = explain("160,2", {"--set", "sensor.look_at_m=[-0.7,0.2,20]",
-                                                 "--hours", "0", "--json", folder.file("e.json")});
+  const ProcessResult result = explain("40,0", {"--set", "sensor.look_at_m=[-0.7,0.2,20]",
+                                                "--hours", "0", "--json", folder.file("e.json")});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const std::string json = read_text(folder.file("e.json"));
   EXPECT_NE(json.find("\"surface\": null"), std::string::npos) << json;
@@ -126,10 +127,10 @@ TEST(CliExplain, the_sky_is_a_path_without_a_surface) {
 }
 
 TEST(CliExplain, a_pixel_outside_the_image_is_refused) {
-  const ProcessResult result = explain("320,0", {});
+  const ProcessResult result = explain("80,0", {});
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_NE(result.err.find("--px"), std::string::npos) << result.err;
-  EXPECT_NE(result.err.find("319,255"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("79,63"), std::string::npos) << result.err;
 }
 
 TEST(CliExplain, a_time_out_of_range_is_refused) {

@@ -54,8 +54,8 @@ double number(const Row& row, const std::string& column) {
 }
 
 std::vector<std::string> probe(std::vector<std::string> more) {
-  std::vector<std::string> arguments{"probe", "block-on-road",       "--set", "sensor.width_px=320",
-                                     "--set", "sensor.height_px=256"};
+  std::vector<std::string> arguments{"probe", "block-on-road",      "--set", "sensor.width_px=80",
+                                     "--set", "sensor.height_px=64"};
   arguments.insert(arguments.end(), more.begin(), more.end());
   return arguments;
 }
@@ -63,12 +63,12 @@ std::vector<std::string> probe(std::vector<std::string> more) {
 TEST(CliProbe, a_pixel_has_the_floats_of_the_picture) {
   const TemporaryFolder folder;
   const ProcessResult probed = run_emit(
-      probe({"--at", "px:160,128", "--at", "px:40,200", "--at", "px:300,140", "--times",
+      probe({"--at", "px:40,32", "--at", "px:10,50", "--at", "px:75,35", "--times",
              "08:00..09:30/45min", "--out", folder.file("p.csv"), "--plot", folder.file("p.svg")}));
   ASSERT_EQ(probed.exit_code, 0) << probed.err;
   EXPECT_NE(read_text(folder.file("p.svg")).find("<svg"), std::string::npos);
-  ASSERT_EQ(run_emit({"render", "block-on-road", "--set", "sensor.width_px=320", "--set",
-                      "sensor.height_px=256", "--times", "08:00..09:30/45min", "--out",
+  ASSERT_EQ(run_emit({"render", "block-on-road", "--set", "sensor.width_px=80", "--set",
+                      "sensor.height_px=64", "--times", "08:00..09:30/45min", "--out",
                       folder.file("f.exr")})
                 .exit_code,
             0);
@@ -80,7 +80,7 @@ TEST(CliProbe, a_pixel_has_the_floats_of_the_picture) {
     const std::string name = row.at("point");
     const std::size_t comma = name.find(',');
     const std::size_t px = static_cast<std::size_t>(std::stoi(name.substr(3, comma - 3))) +
-                           320U * static_cast<std::size_t>(std::stoi(name.substr(comma + 1)));
+                           80U * static_cast<std::size_t>(std::stoi(name.substr(comma + 1)));
     EXPECT_EQ(std::stof(row.at("temperature_k")), frame->find("temperature")->pixels[px]) << name;
     EXPECT_EQ(std::stof(row.at("radiance_8-12_w_m2_sr")), frame->find("radiance")->pixels[px])
         << name;
@@ -94,10 +94,10 @@ TEST(CliProbe, temperatures_are_those_of_the_reference_solution) {
   const ProcessResult probed = run_emit(probe(
       {"--at", folder.file("at.csv"), "--times", "08:00,09:30", "--out", folder.file("p.csv")}));
   ASSERT_EQ(probed.exit_code, 0) << probed.err;
-  const ProcessResult solved =
-      run_emit({"solve", "block-on-road", "--times", "08:00,09:30", "--at", folder.file("at.csv"),
-                "--at-out", folder.file("s.csv"), "--refine", "0.3", "--rays", "64"},
-               std::chrono::seconds(300));
+  const ProcessResult solved = run_emit(
+      {"solve", "block-on-road", "--times", "08:00,09:30", "--at", folder.file("at.csv"),
+       "--at-out", folder.file("s.csv"), "--refine", "0.2", "--spin-up-h", "48", "--rays", "32"},
+      std::chrono::seconds(300));
   ASSERT_EQ(solved.exit_code, 0) << solved.err;
   const std::vector<Row> ours = rows_of(read_text(folder.file("p.csv")));
   const std::vector<Row> truth = rows_of(read_text(folder.file("s.csv")));
@@ -146,7 +146,7 @@ TEST(CliProbe, what_is_not_there_is_named) {
   for (const auto& [at, text] :
        {std::pair{"block_on_rod", "did you mean 'block_on_road'"},
         std::pair{"block_on_road:wood", "has no part 'wood'; it has asphalt, concrete"},
-        std::pair{"px:320,0", "to 319,255"}, std::pair{"1,2", "none of x,y,z"}}) {
+        std::pair{"px:80,0", "to 79,63"}, std::pair{"1,2", "none of x,y,z"}}) {
     const ProcessResult result = run_emit(probe({"--at", at, "--times", "09:00"}));
     EXPECT_EQ(result.exit_code, 2) << at;
     EXPECT_NE(result.err.find(text), std::string::npos) << result.err;

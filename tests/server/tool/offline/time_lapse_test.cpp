@@ -12,10 +12,14 @@ namespace {
 
 /// Shadows of the block wander over the road in these hours. The image is small, which keeps
 /// llvmpipe quick.
-std::vector<std::string> render(const std::string& out, std::vector<std::string> more) {
-  std::vector<std::string> arguments{
-      "render", "block-on-road",       "--out", out,
-      "--set",  "sensor.width_px=320", "--set", "sensor.height_px=256"};
+std::vector<std::string> render(const std::string& out, std::vector<std::string> more,
+                                int width_px = 80) {
+  const std::string width = std::to_string(width_px);
+  const std::string height = std::to_string(width_px * 4 / 5);
+  std::vector<std::string> arguments{"render", "block-on-road",
+                                     "--out",  out,
+                                     "--set",  "sensor.width_px=" + width,
+                                     "--set",  "sensor.height_px=" + height};
   arguments.insert(arguments.end(), more.begin(), more.end());
   return arguments;
 }
@@ -30,12 +34,14 @@ std::size_t count_of(const std::string& text, const std::string& word) {
 
 TEST(TimeLapse, pictures_of_a_sequence_are_those_of_single_runs) {
   const TemporaryFolder folder;
-  const ProcessResult all = run_emit(render(
-      folder.file("s.exr"), {"--times", "06:30..09:30/1h,09:30", "--json", folder.file("s.json")}));
+  constexpr int kWidthPx = 160;
+  const ProcessResult all = run_emit(
+      render(folder.file("s.exr"),
+             {"--times", "06:30..09:30/1h,09:30", "--json", folder.file("s.json")}, kWidthPx));
   ASSERT_EQ(all.exit_code, 0) << all.err;
   EXPECT_EQ(count_of(read_text(folder.file("s.json")), "\"warm_up_ms\""), 1U);
   for (const char* time : {"1800", "5400", "9000", "12600"}) {
-    ASSERT_EQ(run_emit(render(folder.file("one.exr"), {"--time-s", time})).exit_code, 0);
+    ASSERT_EQ(run_emit(render(folder.file("one.exr"), {"--time-s", time}, kWidthPx)).exit_code, 0);
     const ProcessResult diff = run_emit({"compare", folder.file(std::string("s_t") + time + ".exr"),
                                          folder.file("one.exr"), "--json", folder.file("d.json")});
     ASSERT_EQ(diff.exit_code, 0) << diff.err;
