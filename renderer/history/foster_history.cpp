@@ -167,12 +167,17 @@ FosterDrive<double> unshadowed_drive(const SurfaceForcing& f, const FosterMateri
 
 namespace {
 
-/// Returns true if rain on open ground of both materials dries alike.
+/// Returns true if rain on open ground of both materials dries alike. Sheets of any heat capacity
+/// have the same resistance, so that every mode counts.
 bool dry_alike(const FosterMaterial& a, const FosterMaterial& b) noexcept {
+  const auto same_mode = [](const physics::NetworkMode& x, const physics::NetworkMode& y) {
+    return x.tau_s == y.tau_s && x.resistance_m2k_w == y.resistance_m2k_w;
+  };
   return a.store == b.store && a.moisture == b.moisture && a.roughness == b.roughness &&
          a.solar_absorptance_frac == b.solar_absorptance_frac &&
          a.emissivity_frac == b.emissivity_frac && a.base_k == b.base_k &&
-         a.network.resistance_m2k_w() == b.network.resistance_m2k_w();
+         a.initial_k == b.initial_k && a.body == b.body && a.network.count == b.network.count &&
+         std::ranges::equal(a.network.modes, b.network.modes, same_mode);
 }
 
 /// Gives the materials that hold water their slots. Materials beyond the last slot share that of

@@ -5,8 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <glm/geometric.hpp>
 #include <random>
+#include <string_view>
+#include <utility>
 
 #include "emit/physics/constants.hpp"
 #include "support/times.hpp"
@@ -361,6 +364,92 @@ TEST(FosterMaterials, NameTheMaterialWithoutLayers) {
   const auto materials = foster_materials(s.materials, s.thermal);
   ASSERT_FALSE(materials);
   EXPECT_NE(materials.error().text.find("'concrete'"), std::string::npos);
+}
+
+TEST(FosterMaterials, ShareGroundOnlyWhereAllThatDriesItIsTheSame) {
+  using Change = std::pair<const char*, std::function<void(scene::Material&)>>;
+  const Change changes[] = {
+      {"store", [](scene::Material& m) { m.water_store_mm = 0.49; }},
+      {"kind of store", [](scene::Material& m) { m.readily_evaporable_mm = 0.2; }},
+      {"absorptance", [](scene::Material& m) { m.solar_absorptance_frac = 0.79; }},
+      {"emissivity", [](scene::Material& m) { m.emissivity_frac = 0.91; }},
+      {"roughness", [](scene::Material& m) { m.roughness = scene::Roughness::smooth; }},
+      {"leaves", [](scene::Material& m) { m.surface_resistance_s_m = 70.0; }},
+      {"base", [](scene::Material& m) { m.base_k = 287.15; }},
+      {"kind of base", [](scene::Material& m) { m.base = scene::BaseKind::body; }},
+      {"start", [](scene::Material& m) { m.initial_k = 280.0; }},
+      // The resistance stays.
+      {"heat capacity", [](scene::Material& m) { m.layers[0].density_kg_m3 *= 2.0; }},
+      {"order of layers", [](scene::Material& m) { std::swap(m.layers[0], m.layers[1]); }},
+      {"sheet", [](scene::Material& m) { m.sheet = !m.sheet; }}};
+  for (const bool sheet : {false, true}) {
+    scene::ScenarioDesc s = scenario(0.0);
+    scene::Material& ground = s.materials[1];
+    ground.layers = {{0.1, 1.7, 2300, 878}, {0.9, 0.7, 1200, 878}};
+    ground.water_store_mm = 0.48;
+    ground.sheet = sheet;
+    for (const auto& [name, change] : changes) {
+      // A sheet rests on nothing, and its capacity does not depend on the order of its layers.
+      const std::string_view key = name;
+      if (sheet && (key == "order of layers" || key == "kind of base")) continue;
+      scene::Material other = ground;
+      change(other);
+      const auto built = foster_materials(std::vector{ground, other, ground}, s.thermal);
+      ASSERT_TRUE(built.has_value());
+      EXPECT_EQ((*built)[1].water_slot, 1) << name << (sheet ? " of a sheet" : "");
+      EXPECT_EQ((*built)[2].water_slot, 0) << name << (sheet ? " of a sheet" : "");
+    }
+  }
+}
+
+TEST(FosterHistory, ThickAndThinSheetsDryByThemselves) {
+  // Roofs of foam and of steel, with a shower before a clear morning.
+  scene::ScenarioDesc s = scenario(0.0);
+  s.thermal.history_start_ns = -24 * 3600 * kSecondNs;
+  s.thermal.steps = 48;
+  const physics::GeoPlace place{physics::Radians(s.place.lat_rad), physics::Radians(s.place.lon_rad),
+                                physics::Metres(s.place.height_m)};
+  for (std::int64_t hour = -72; hour <= 6; ++hour) {
+    const std::int64_t utc_ns = s.epoch_utc_ns + hour * 3600 * kSecondNs;
+    const physics::Forcing f = physics::forcing_from_clear_sky(
+        s.clear_sky, place, physics::sun_position(utc_ns, place), utc_ns);
+    scene::WeatherSample row;
+    row.sim_time_ns = hour * 3600 * kSecondNs;
+    row.direct_normal_w_m2 = f.direct_normal_w_m2;
+    row.diffuse_horizontal_w_m2 = f.diffuse_horizontal_w_m2;
+    row.longwave_down_w_m2 = f.longwave_down_w_m2;
+    row.air_k = f.air_k;
+    row.wind_m_s = f.wind_m_s;
+    row.rain_mm_h = hour == 1 ? 2.0 : 0.0;
+    s.weather.push_back(row);
+  }
+  scene::Material foam = material("foam", {{0.02, 0.04, 20, 1400}});
+  foam.sheet = true;
+  foam.water_store_mm = 0.48;
+  scene::Material slate = foam;
+  slate.layers[0].density_kg_m3 = 2500.0;
+  const Environment environment(s);
+  const auto wet_of = [&](std::vector<scene::Material> materials) {
+    // The first material is that of the surroundings, which hold no water.
+    materials.insert(materials.begin(), scenario(0.0).materials[0]);
+    s.materials = std::move(materials);
+    FosterHistory history = history_of(s, environment);
+    StepPlan plan(s.thermal);
+    plan.update(2 * 3600 * kSecondNs, environment, {});
+    history.update(plan, environment);
+    std::vector<double> out;
+    for (const FosterMaterial& m : history.materials().subspan(1)) {
+      out.push_back(
+          history.intervals().back().end.wet_frac[static_cast<std::size_t>(m.water_slot)]);
+    }
+    return out;
+  };
+  const double foam_frac = wet_of({foam})[0];
+  const double slate_frac = wet_of({slate})[0];
+  const std::vector<double> both_frac = wet_of({foam, slate});
+  EXPECT_GT(std::abs(foam_frac - slate_frac), 0.05);
+  EXPECT_EQ(both_frac[0], foam_frac);
+  EXPECT_EQ(both_frac[1], slate_frac);
 }
 
 TEST(FosterMaterials, TakeFittedModesUnlessAnotherNumberIsAskedFor) {
