@@ -57,18 +57,15 @@ glm::dvec2 octahedral_from_unit(const glm::dvec3& n) noexcept {
   return p;
 }
 
-/// Returns the states of a steady profile between a surface temperature and the base.
-FosterState<double> initial_states(const FosterMaterial& material, double surface_k) noexcept {
+/// Returns the states of a steady profile between the surface's first temperature and the base.
+FosterState<double> initial_states(const FosterMaterial& material) noexcept {
   FosterState<double> x{};
-  const double flux_w_m2 = (surface_k - material.base_k) / material.network.resistance_m2k_w();
+  const double flux_w_m2 =
+      (material.initial_k - material.base_k) / material.network.resistance_m2k_w();
   for (std::size_t i = 0; i < material.network.count; ++i) {
     x[i] = material.network.modes[i].resistance_m2k_w * flux_w_m2;
   }
   return x;
-}
-
-FosterState<double> initial_states(const FosterMaterial& material) noexcept {
-  return initial_states(material, material.initial_k);
 }
 
 physics::FosterSurface<double> surface_of(const FosterMaterial& material,
@@ -310,15 +307,7 @@ SurfaceForcing FosterHistory::forcing(const physics::SunPosition& sun,
   return out;
 }
 
-void FosterHistory::look_for_water(const Environment& environment) noexcept {
-  has_water_ =
-      environment.rains() || std::ranges::any_of(water_grounds_, [](const FosterMaterial& ground) {
-        return ground.store.initial_mm > 0.0;
-      });
-}
-
 void FosterHistory::carry_water(const HistoryInterval& interval, IntervalForcing& out) noexcept {
-  if (!has_water_) return;
   constexpr double kLongestPartS = 300.0;
   constexpr std::size_t kFinestLevel = 3;
   const glm::dvec3 up(0.0, 0.0, 1.0);
@@ -327,14 +316,6 @@ void FosterHistory::carry_water(const HistoryInterval& interval, IntervalForcing
     const FosterMaterial& ground = water_grounds_[s];
     const physics::FosterSurface<double>& surface = water_surfaces_[s];
     WaterGround& now = ground_.water[s];
-    if (!now.followed) {
-      // Ground of which nothing was known has the temperature of the surroundings.
-      const double around_k = surroundings_.prescribed()
-                                  ? surroundings_.prescribed_k
-                                  : reference_k_ + physics::foster_offset_k(ground_.surroundings,
-                                                                            surroundings_surface_);
-      now = {initial_states(ground, around_k), 0.0, true};
-    }
     const double rain_mm = std::max(0.0, interval.rain_mm);
     const bool wet = rain_mm > 0.0 || now.water_mm > 0.0;
     // Set up the drive of ground that is as the material states it, and of ground wet all over.
@@ -453,7 +434,6 @@ void FosterHistory::forcing_over(std::span<const std::int64_t> nodes_ns,
                                  std::span<IntervalForcing> out) noexcept {
   EMIT_CHECK_OP(out.size() + 1, ==, nodes_ns.size());
   EMIT_DCHECK(std::ranges::is_sorted(nodes_ns));
-  look_for_water(environment);
   ground_ = ground_at_start_;
   for (std::size_t i = 0; i < out.size(); ++i) {
     carry(interval_between(nodes_ns[i], nodes_ns[i + 1], environment), tolerance_k_, out[i]);
@@ -461,11 +441,9 @@ void FosterHistory::forcing_over(std::span<const std::int64_t> nodes_ns,
 }
 
 void FosterHistory::spin_up_surroundings(const Environment& environment) noexcept {
-  look_for_water(environment);
   ground_ = {};
-  for (std::size_t s = 0; s < water_grounds_.size() && has_water_; ++s) {
-    ground_.water[s] = {initial_states(water_grounds_[s]), water_grounds_[s].store.initial_mm,
-                        true};
+  for (std::size_t s = 0; s < water_grounds_.size(); ++s) {
+    ground_.water[s] = {initial_states(water_grounds_[s]), water_grounds_[s].store.initial_mm};
   }
   ground_.surroundings =
       surroundings_.prescribed() ? FosterState<double>{} : initial_states(surroundings_);
@@ -509,7 +487,6 @@ FosterState<double> FosterHistory::start_states(std::size_t material,
 IntervalForcing FosterHistory::extend(std::int64_t begin_ns, std::int64_t end_ns,
                                       const Environment& environment) noexcept {
   IntervalForcing out;
-  look_for_water(environment);
   carry(interval_between(begin_ns, end_ns, environment), tolerance_k_, out);
   return out;
 }
@@ -578,7 +555,6 @@ bool FosterHistory::update(const StepPlan& plan, const Environment& environment)
       changed = true;
     }
   }
-  look_for_water(environment);
   ground_ = ground_at_start_;
   const auto intervals = plan.intervals();
   for (std::size_t i = 0; i < intervals.size() && i < intervals_.size(); ++i) {

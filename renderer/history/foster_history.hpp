@@ -108,10 +108,9 @@ class FosterHistory {
   void spin_up_surroundings(const Environment& environment) noexcept;
   /// Advances the surroundings over one interval and writes its forcing.
   void carry(const HistoryInterval& interval, double tolerance_k, IntervalForcing& out) noexcept;
-  /// Advances the water of the grounds over one interval and writes its wetness.
+  /// Advances heat and water of the grounds over one interval and writes their wetness. Dry grounds
+  /// advance too, since a host may let it rain at any instant.
   void carry_water(const HistoryInterval& interval, IntervalForcing& out) noexcept;
-  /// Notes whether there is water to follow.
-  void look_for_water(const Environment& environment) noexcept;
   [[nodiscard]] SurfaceForcing forcing(const physics::SunPosition& sun,
                                        const physics::Forcing& weather) const noexcept;
 
@@ -128,7 +127,6 @@ class FosterHistory {
   GroundState ground_at_start_;                ///< state at the history's start
   std::vector<FosterMaterial> water_grounds_;  ///< a material of each slot
   std::vector<physics::FosterSurface<double>> water_surfaces_;
-  bool has_water_ = false;  ///< it rains, or some ground starts moist
   double surroundings_now_k_ = 0.0;
 
   std::vector<IntervalForcing> spin_up_;  ///< intervals up to the instant of the table

@@ -327,6 +327,66 @@ TEST(FosterHistory, RainWetsWhatHoldsWaterAndNothingElse) {
   EXPECT_EQ(history.surroundings_now_k(), dry_k);
 }
 
+TEST(FosterHistory, GroundBeforeTheFirstRainOfAHostIsItsOwn) {
+  // Grounds that differ from the surroundings by colour, kind and thickness.
+  scene::ScenarioDesc s = scenario(-12.0 * 3600.0);
+  s.materials[0].solar_absorptance_frac = 0.2;
+  s.materials[1].water_store_mm = 0.48;
+  s.materials[1].solar_absorptance_frac = 0.9;
+  s.materials[2].water_store_mm = 0.48;
+  s.materials[2].sheet = true;
+  s.materials[3].water_store_mm = 2.0;
+  s.materials.push_back(s.materials[1]);
+  s.materials[4].water_store_mm = 19.0;
+  s.materials[4].readily_evaporable_mm = 9.0;
+  const std::int64_t start_ns = 4 * 3600 * kSecondNs;
+  for (const std::int64_t wait_s : {60, 1800, 7200}) {
+    const std::int64_t rain_ns = start_ns + wait_s * kSecondNs;
+    const auto let_it_rain = [&](Environment& environment) {
+      scene::WeatherSample live;
+      const physics::Forcing now = environment.forcing_at(rain_ns, environment.sun_at(rain_ns));
+      live.direct_normal_w_m2 = now.direct_normal_w_m2;
+      live.diffuse_horizontal_w_m2 = now.diffuse_horizontal_w_m2;
+      live.longwave_down_w_m2 = now.longwave_down_w_m2;
+      live.air_k = now.air_k;
+      live.wind_m_s = now.wind_m_s;
+      live.sim_time_ns = rain_ns;
+      live.rain_mm_h = 12.0;
+      EXPECT_TRUE(environment.append(live));
+      live.sim_time_ns = rain_ns + 600 * kSecondNs;
+      live.rain_mm_h = 0.0;
+      EXPECT_TRUE(environment.append(live));
+    };
+    // One history learns of the rain when it falls, the other one knows it from the start.
+    Environment live(s);
+    FosterHistory told = history_of(s, live);
+    Environment all(s);
+    let_it_rain(all);
+    FosterHistory knew = history_of(s, all);
+    StepPlan plan(s.thermal);
+    plan.update(start_ns, live, {});
+    told.update(plan, live);
+    knew.update(plan, all);
+    IntervalForcing is;
+    IntervalForcing should;
+    std::int64_t at_ns = start_ns;
+    for (; at_ns < rain_ns + 4200 * kSecondNs; at_ns += 60 * kSecondNs) {
+      if (at_ns == rain_ns) let_it_rain(live);
+      is = told.extend(at_ns, at_ns + 60 * kSecondNs, live);
+      should = knew.extend(at_ns, at_ns + 60 * kSecondNs, all);
+    }
+    // A later update computes the same course with other steps.
+    plan.update(at_ns, live, {});
+    told.update(plan, live);
+    for (std::size_t slot = 0; slot < 4; ++slot) {
+      EXPECT_EQ(is.end.wet_frac[slot], should.end.wet_frac[slot]) << slot << " " << wait_s;
+      EXPECT_NEAR(told.intervals().back().end.wet_frac[slot], is.end.wet_frac[slot], 0.04)
+          << slot << " " << wait_s;
+    }
+    EXPECT_GT(is.end.wet_frac[3], 0.1);
+  }
+}
+
 TEST(FosterHistory, SoilStartsAsWetAsStatedAndDriesWithoutRain) {
   scene::ScenarioDesc s = scenario(0.0);
   s.materials[0].water_store_mm = 19.0;
