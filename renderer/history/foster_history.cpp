@@ -177,34 +177,52 @@ bool dry_alike(const FosterMaterial& a, const FosterMaterial& b) noexcept {
          std::ranges::equal(a.network.modes, b.network.modes, same_mode);
 }
 
-/// Gives the materials that hold water their slots. Materials beyond the last slot share that of
-/// the store whose capacity is closest by ratio.
-void number_water(std::vector<FosterMaterial>& materials) {
-  std::vector<std::size_t> owners;
-  for (std::size_t m = 0; m < materials.size(); ++m) {
-    FosterMaterial& material = materials[m];
-    if (material.store.none()) continue;
-    const auto same = std::ranges::find_if(
-        owners, [&](std::size_t owner) { return dry_alike(materials[owner], material); });
-    if (same != owners.end()) {
-      material.water_slot = static_cast<int>(same - owners.begin());
-    } else if (owners.size() < physics::kWaterSlots) {
-      material.water_slot = static_cast<int>(owners.size());
-      owners.push_back(m);
-    } else {
-      const auto unlike = [&](std::size_t owner) {
-        const physics::WaterStore& store = materials[owner].store;
-        const bool other_kind = store.kind != material.store.kind;
-        return (other_kind ? 100.0 : 0.0) +
-               std::abs(std::log(store.capacity_mm / material.store.capacity_mm));
-      };
-      material.water_slot =
-          static_cast<int>(std::ranges::min_element(owners, {}, unlike) - owners.begin());
-    }
-  }
+/// Returns how little two stores have in common: the capacity by ratio, after the kind.
+double unlikeness(const physics::WaterStore& a, const physics::WaterStore& b) noexcept {
+  return (a.kind != b.kind ? 100.0 : 0.0) + std::abs(std::log(a.capacity_mm / b.capacity_mm));
 }
 
 }  // namespace
+
+void number_water(std::span<FosterMaterial> materials) {
+  std::vector<std::size_t> owners;
+  // Gives a material a slot if there is one for it.
+  const auto place = [&](std::size_t m) {
+    FosterMaterial& material = materials[m];
+    const auto same = std::ranges::find_if(
+        owners, [&](std::size_t owner) { return dry_alike(materials[owner], material); });
+    material.water_shared = same == owners.end() && owners.size() == physics::kWaterSlots;
+    if (material.water_shared) return;
+    material.water_slot = static_cast<int>(same - owners.begin());
+    if (same == owners.end()) owners.push_back(m);
+  };
+  std::vector<std::size_t> means(materials.size());
+  for (std::size_t m = 0; m < means.size(); ++m) means[m] = m;
+  for (std::size_t m = 0; m < materials.size(); ++m) {
+    const std::size_t twin = materials[m].first_twin;
+    if (twin != 0) means[twin] = means[twin + 1] = m;
+  }
+  // Twins get what the materials leave.
+  for (const bool twins : {false, true}) {
+    for (std::size_t m = 0; m < materials.size(); ++m) {
+      if (!materials[m].store.none() && (means[m] != m) == twins) place(m);
+    }
+  }
+  for (const bool twins : {false, true}) {
+    for (std::size_t m = 0; m < materials.size(); ++m) {
+      FosterMaterial& material = materials[m];
+      if (!material.water_shared || (means[m] != m) != twins) continue;
+      if (twins) {
+        material.water_slot = materials[means[m]].water_slot;
+        continue;
+      }
+      const auto most_alike = std::ranges::min_element(owners, {}, [&](std::size_t owner) {
+        return unlikeness(materials[owner].store, material.store);
+      });
+      material.water_slot = static_cast<int>(most_alike - owners.begin());
+    }
+  }
+}
 
 physics::Result<std::vector<FosterMaterial>> foster_materials(
     std::span<const scene::Material> materials, const scene::ThermalOptions& options) {
@@ -282,12 +300,18 @@ FosterHistory::FosterHistory(const scene::ScenarioDesc& scenario,
   }
   nodes_ns_.resize(kSpinUpSteps + 1);
   table_.resize(materials_.size() * grid_nodes_ * grid_nodes_);
-  // Take the first material of each slot for its ground.
+  // Take a material of its own in each slot for its ground.
+  std::array<const FosterMaterial*, physics::kWaterSlots> owners{};
   for (std::size_t m = 0; m <= materials_.size(); ++m) {
     const FosterMaterial& material = m < materials_.size() ? materials_[m] : surroundings_;
-    if (material.water_slot != static_cast<int>(water_grounds_.size())) continue;
-    water_grounds_.push_back(material);
-    water_surfaces_.push_back(surface_of(material, reference_k));
+    if (material.water_slot < 0 || material.water_shared) continue;
+    const FosterMaterial*& owner = owners[static_cast<std::size_t>(material.water_slot)];
+    if (owner == nullptr) owner = &material;
+  }
+  for (const FosterMaterial* const owner : owners) {
+    if (owner == nullptr) break;
+    water_grounds_.push_back(*owner);
+    water_surfaces_.push_back(surface_of(*owner, reference_k));
   }
   spin_up_gains_.resize(materials_.size());
   spin_up(environment, [](std::size_t rows, const auto& fill) {

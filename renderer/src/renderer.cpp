@@ -815,6 +815,10 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
 
   auto foster = build_foster_materials(scenario, geometry->materials);
   if (!foster) return tl::unexpected(std::move(foster.error()));
+  if (!foster->empty()) {
+    const std::string shared = shared_water_warning(scenario, geometry->materials, *foster);
+    if (!shared.empty()) geometry->warnings.push_back(shared);
+  }
 
   auto clutter = ClutterFields::build(geometry->materials);
   if (!clutter) return tl::unexpected(std::move(clutter.error()));

@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <functional>
 #include <glm/geometric.hpp>
 #include <random>
@@ -12,6 +14,9 @@
 #include <utility>
 
 #include "emit/physics/constants.hpp"
+#include "emit/physics/sun.hpp"
+#include "emit/physics/weather.hpp"
+#include "history/foster_setup.hpp"
 #include "support/times.hpp"
 
 namespace emit::renderer {
@@ -462,14 +467,15 @@ TEST(FosterMaterials, ShareGroundOnlyWhereAllThatDriesItIsTheSame) {
   }
 }
 
-TEST(FosterHistory, ThickAndThinSheetsDryByThemselves) {
-  // Roofs of foam and of steel, with a shower before a clear morning.
+/// Returns the scenario with its clear sky as an hourly table, in which it rains 2 mm in one hour
+/// that begins at 06:00 UTC + `rain_h`.
+scene::ScenarioDesc shower(std::int64_t rain_h) {
   scene::ScenarioDesc s = scenario(0.0);
   s.thermal.history_start_ns = -24 * 3600 * kSecondNs;
   s.thermal.steps = 48;
   const physics::GeoPlace place{physics::Radians(s.place.lat_rad), physics::Radians(s.place.lon_rad),
                                 physics::Metres(s.place.height_m)};
-  for (std::int64_t hour = -72; hour <= 6; ++hour) {
+  for (std::int64_t hour = -72; hour <= 24; ++hour) {
     const std::int64_t utc_ns = s.epoch_utc_ns + hour * 3600 * kSecondNs;
     const physics::Forcing f = physics::forcing_from_clear_sky(
         s.clear_sky, place, physics::sun_position(utc_ns, place), utc_ns);
@@ -480,9 +486,15 @@ TEST(FosterHistory, ThickAndThinSheetsDryByThemselves) {
     row.longwave_down_w_m2 = f.longwave_down_w_m2;
     row.air_k = f.air_k;
     row.wind_m_s = f.wind_m_s;
-    row.rain_mm_h = hour == 1 ? 2.0 : 0.0;
+    row.rain_mm_h = hour == rain_h + 1 ? 2.0 : 0.0;
     s.weather.push_back(row);
   }
+  return s;
+}
+
+TEST(FosterHistory, ThickAndThinSheetsDryByThemselves) {
+  // Roofs of foam and of slate, with a shower before a clear morning.
+  scene::ScenarioDesc s = shower(0);
   scene::Material foam = material("foam", {{0.02, 0.04, 20, 1400}});
   foam.sheet = true;
   foam.water_store_mm = 0.48;
@@ -510,6 +522,114 @@ TEST(FosterHistory, ThickAndThinSheetsDryByThemselves) {
   EXPECT_GT(std::abs(foam_frac - slate_frac), 0.05);
   EXPECT_EQ(both_frac[0], foam_frac);
   EXPECT_EQ(both_frac[1], slate_frac);
+}
+
+scene::Clutter clutter() {
+  scene::Clutter out;
+  out.solar_absorptance_sd_frac = 0.05;
+  out.inertia_sd_ln = 0.5 * std::log(2.0);
+  return out;
+}
+
+TEST(FosterMaterials, TwinsTakeTheSlotsThatTheMaterialsLeave) {
+  for (const std::size_t count : {2, 4, 9}) {
+    scene::ScenarioDesc s = shower(0);
+    const scene::Material road = s.materials[0];
+    s.materials.clear();
+    for (std::size_t m = 0; m < count; ++m) {
+      s.materials.push_back(road);
+      s.materials[m].name = "road " + std::to_string(m);
+      s.materials[m].water_store_mm = 0.3 + 0.1 * static_cast<double>(m);
+      s.materials[m].clutter = clutter();
+    }
+    s.default_material = "road 0";
+    s.file = "s.toml";
+    const auto built = build_foster_materials(s, s.materials);
+    ASSERT_TRUE(built.has_value());
+    ASSERT_EQ(built->size(), 3 * count + 1);
+    std::size_t next = std::min<std::size_t>(count, physics::kWaterSlots);
+    for (std::size_t m = 0; m < count; ++m) {
+      const bool own = m < physics::kWaterSlots;
+      EXPECT_EQ((*built)[m].water_shared, !own);
+      EXPECT_EQ((*built)[m].water_slot, own ? m : physics::kWaterSlots - 1) << "nearest capacity";
+      for (std::size_t twin = (*built)[m].first_twin; twin < (*built)[m].first_twin + 2; ++twin) {
+        const bool left = next < physics::kWaterSlots;
+        EXPECT_EQ((*built)[twin].water_shared, !left);
+        EXPECT_EQ((*built)[twin].water_slot,
+                  left ? static_cast<int>(next++) : (*built)[m].water_slot);
+      }
+    }
+    // The surroundings are a material of the scene and take no slot of their own.
+    EXPECT_EQ(built->back().water_slot, 0);
+    EXPECT_FALSE(built->back().water_shared);
+    const std::string warning = shared_water_warning(s, s.materials, *built);
+    const auto names = [&](const std::string& text) {
+      return warning.find(text) != std::string::npos;
+    };
+    EXPECT_EQ(warning.empty(), count == 2) << warning;
+    EXPECT_EQ(names("s.toml: more materials hold rain water than the 8"), count > 2) << warning;
+    EXPECT_EQ(names("'road 8' dries as another material does"), count == 9) << warning;
+    EXPECT_FALSE(names("'road 7' dries as another")) << warning;
+    EXPECT_FALSE(names("surroundings")) << warning;
+    EXPECT_EQ(names("the clutter of 'road 1' dries as its mean does"), count == 9) << warning;
+    EXPECT_EQ(names("the clutter of 'road 3' dries as its mean does"), count > 2) << warning;
+    // Nobody is told about rain where none is known.
+    for (scene::WeatherSample& row : s.weather) row.rain_mm_h = 0.0;
+    EXPECT_EQ(shared_water_warning(s, s.materials, *built), "");
+    // Every material has the ground of its slot in a history.
+    const Environment environment(s);
+    EXPECT_TRUE(make_foster(s, *built, environment, kReferenceK).has_value());
+  }
+}
+
+TEST(FosterMaterials, TwinsWithTheGroundOfTheirMeanCostAccuracy) {
+  // This is why twins have grounds of their own while there are slots.
+  for (const std::int64_t rain_h : {-6, 0, 5}) {
+    scene::ScenarioDesc s = shower(rain_h);
+    s.materials[1].water_store_mm = 0.48;
+    s.materials[1].clutter = clutter();
+    const std::vector one{s.materials[1]};
+    auto built = build_foster_materials(s, one);
+    ASSERT_TRUE(built.has_value());
+    const Environment environment(s);
+    auto history = make_foster(s, *built, environment, kReferenceK);
+    ASSERT_TRUE(history.has_value());
+    StepPlan plan(s.thermal);
+    std::int64_t at_ns = (rain_h - 1) * 3600 * kSecondNs;
+    plan.update(at_ns, environment, {});
+    history->update(plan, environment);
+    double worst_k = 0.0;
+    std::array<std::array<physics::FosterState<double>, 2>, 2> states{};
+    for (std::size_t side = 0; side < 2; ++side) {
+      states[side].fill(history->spun_up(1 + side, {0.0, 0.0, 1.0}));
+    }
+    for (int step = 0; step < 12 * 10; ++step) {
+      const IntervalForcing forcing = history->extend(at_ns, at_ns + 300 * kSecondNs, environment);
+      at_ns += 300 * kSecondNs;
+      for (std::size_t side = 0; side < 2; ++side) {
+        double k[2];
+        for (std::size_t shares = 0; shares < 2; ++shares) {
+          FosterMaterial twin = (*built)[1 + side];
+          if (shares == 1) twin.water_slot = (*built)[0].water_slot;
+          const auto surface = physics::foster_surface(twin.network, twin.emissivity_frac,
+                                                       twin.base_k, kReferenceK);
+          physics::FosterState<double>& x = states[side][shares];
+          const double offset_k = physics::foster_offset_k(x, surface);
+          const auto drive = [&](const SurfaceForcing& f) {
+            return unshadowed_drive(f, twin, {0.0, 0.0, 1.0}, kReferenceK, offset_k);
+          };
+          physics::foster_advance(x, drive(forcing.begin), drive(forcing.end),
+                                  physics::foster_ladder(forcing.dt_s, twin.network), surface,
+                                  0.01);
+          k[shares] = physics::foster_offset_k(x, surface);
+        }
+        worst_k = std::max(worst_k, std::abs(k[1] - k[0]));
+      }
+    }
+    std::printf("rain at %+d h: twins that share the ground of their mean are off by %.2f K\n",
+                static_cast<int>(rain_h), worst_k);
+    EXPECT_GT(worst_k, 0.1);
+  }
 }
 
 TEST(FosterMaterials, TakeFittedModesUnlessAnotherNumberIsAskedFor) {
