@@ -332,7 +332,8 @@ SurfaceForcing FosterHistory::forcing(const physics::SunPosition& sun,
 }
 
 void FosterHistory::carry_water(const HistoryInterval& interval, IntervalForcing& out) noexcept {
-  constexpr double kLongestPartS = 300.0;
+  // Parts last 300 s or less, but for the oldest, longest intervals, which have eight.
+  constexpr double kPartS = 300.0;
   constexpr std::size_t kFinestLevel = 3;
   const glm::dvec3 up(0.0, 0.0, 1.0);
   const double j_kg = physics::vaporisation_j_kg(out.begin.air_k);
@@ -382,7 +383,7 @@ void FosterHistory::carry_water(const HistoryInterval& interval, IntervalForcing
     };
     // Let heat and water take turns over short parts of the interval.
     std::size_t level = 0;
-    while (level < kFinestLevel && out.dt_s > kLongestPartS * static_cast<double>(1U << level)) {
+    while (level < kFinestLevel && out.dt_s > kPartS * static_cast<double>(1U << level)) {
       ++level;
     }
     const double parts = static_cast<double>(1U << level);

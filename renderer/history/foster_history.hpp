@@ -36,9 +36,9 @@ namespace emit::renderer {
                                                             double reference_k,
                                                             double offset_k) noexcept;
 
-/// Gives the materials that hold water their slots: at first materials that are no twins, then twins
-/// as far as slots are left. What gets none has `water_shared` and the slot of another material: a
-/// twin that of its mean, others that whose store is most alike. Setup only.
+/// Gives the materials that hold water their slots: at first materials that are no twins, then
+/// twins as far as slots are left. What gets none has `water_shared` and the slot of another
+/// material: a twin that of its mean, others that whose store is most alike. Setup only.
 /// @pre the slots are not set, but first_twin is
 void number_water(std::span<FosterMaterial> materials);
 

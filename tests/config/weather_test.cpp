@@ -108,7 +108,8 @@ TEST_F(Weather, rain_of_the_first_row_has_no_begin_and_is_named) {
   EXPECT_THAT(whole.warnings,
               ElementsAre(AllOf(HasSubstr("w.csv: the first row (-172800 s)"), is_named)));
   EXPECT_DOUBLE_EQ(rain_mm(whole), 4.0);
-  // What the models make before the table is dry, and takes on no rain of the first row either.
+  // The rows that the models make before the table are dry, and rain of the first row does not
+  // reach back into them.
   const auto late = load(table(6, 2.5, 4.0));
   ASSERT_EQ(late.warnings.size(), 2U);
   EXPECT_THAT(late.warnings[0], AllOf(HasSubstr("w.csv: the first row (21600 s)"), is_named));

@@ -50,9 +50,9 @@ struct Stretch {
   double drained_mm = 0.0;
 };
 
-/// Advances the water over a stretch in small steps of second order (Heun's), never below 0 or above
-/// the store. What evaporates is the sum of the rates, less what was not there; what drains is the
-/// sum of what the store could not take.
+/// Advances the water over a stretch in small steps of second order (Heun's), never below 0 or
+/// above the store. What evaporates is the sum of the rates, less what was not there; what drains
+/// is the sum of what the store could not take.
 Stretch later(const WaterStore& store, double water_mm, double rain_mm_s, double begin_mm_s,
               double end_mm_s, double dt_s, const ClimateNode& node) noexcept {
   constexpr double kStepS = 1.0;
@@ -131,8 +131,7 @@ WaterCourse water_course(std::span<const ClimateNode> nodes, const scene::Materi
       solver.advance({solver.time_s(), end_s, face_at(a, warm_share(store, water_mm, a)),
                       face_at(b, warm_share(store, expected_mm, b))},
                      surface.emissivity_frac);
-      const Stretch after =
-          later(store, water_mm, rain_mm_s, begin_mm_s, open_mm_s(b), dt_s, b);
+      const Stretch after = later(store, water_mm, rain_mm_s, begin_mm_s, open_mm_s(b), dt_s, b);
       water_mm = after.water_mm;
       out.evaporated_mm += after.evaporated_mm;
       out.drained_mm += after.drained_mm;

@@ -473,7 +473,8 @@ scene::ScenarioDesc shower(std::int64_t rain_h) {
   scene::ScenarioDesc s = scenario(0.0);
   s.thermal.history_start_ns = -24 * 3600 * kSecondNs;
   s.thermal.steps = 48;
-  const physics::GeoPlace place{physics::Radians(s.place.lat_rad), physics::Radians(s.place.lon_rad),
+  const physics::GeoPlace place{physics::Radians(s.place.lat_rad),
+                                physics::Radians(s.place.lon_rad),
                                 physics::Metres(s.place.height_m)};
   for (std::int64_t hour = -72; hour <= 24; ++hour) {
     const std::int64_t utc_ns = s.epoch_utc_ns + hour * 3600 * kSecondNs;
@@ -522,6 +523,54 @@ TEST(FosterHistory, ThickAndThinSheetsDryByThemselves) {
   EXPECT_GT(std::abs(foam_frac - slate_frac), 0.05);
   EXPECT_EQ(both_frac[0], foam_frac);
   EXPECT_EQ(both_frac[1], slate_frac);
+}
+
+TEST(FosterHistory, SoilAfterOldRainIsThatOfEvenSteps) {
+  // The history that scenarios have by themselves, whose oldest intervals last hours.
+  constexpr std::int64_t kHourNs = 3600 * kSecondNs;
+  double worst_k = 0.0;
+  double longest_s = 0.0;
+  for (const std::int64_t ago_h : {20, 36, 60}) {
+    const std::int64_t now_ns = 6 * kHourNs;
+    scene::ScenarioDesc s = shower(6 - ago_h);
+    s.weather.insert(s.weather.begin(), s.weather.front());
+    s.weather.front().sim_time_ns = -96 * kHourNs;
+    s.thermal.history_start_ns = now_ns - 84 * kHourNs;
+    s.thermal.spin_up_ns = 0;
+    s.materials[0].layers = {{0.4, 0.6, 1600, 1000}};
+    s.materials[0].water_store_mm = 19.0;
+    s.materials[0].readily_evaporable_mm = 9.0;
+    for (scene::WeatherSample& row : s.weather) row.rain_mm_h *= 5.0;
+    const Environment environment(s);
+    const auto ground = [&](scene::StepSpacing spacing, std::uint32_t steps) {
+      s.thermal.spacing = spacing;
+      s.thermal.steps = steps;
+      FosterHistory history = history_of(s, environment);
+      StepPlan plan(s.thermal);
+      plan.update(now_ns, environment, {});
+      history.update(plan, environment);
+      if (spacing == scene::StepSpacing::geometric) {
+        longest_s = history.intervals().front().dt_s;
+      }
+      return std::pair(history.surroundings_now_k(), history.surroundings().water[0].water_mm);
+    };
+    const auto [is_k, is_mm] = ground(scene::StepSpacing::geometric, 64);
+    const auto [even_k, even_mm] = ground(scene::StepSpacing::uniform, 1008);
+    for (scene::WeatherSample& row : s.weather) row.rain_mm_h = 0.0;
+    const Environment dry(s);
+    FosterHistory history = history_of(s, dry);
+    StepPlan plan(s.thermal);
+    plan.update(now_ns, dry, {});
+    history.update(plan, dry);
+    std::printf(
+        "soil %d h after rain: %.3f K and %.3f mm, even steps %.3f K and %.3f mm, dry %.2f K\n",
+        static_cast<int>(ago_h), is_k, is_mm, even_k, even_mm, history.surroundings_now_k());
+    EXPECT_GT(even_mm, 0.5);
+    EXPECT_GT(history.surroundings_now_k() - even_k, 1.0);
+    worst_k = std::max(worst_k, std::abs(is_k - even_k));
+  }
+  EXPECT_LT(worst_k, 0.1);
+  EXPECT_NEAR(longest_s / 8.0, 4206.0, 1.0);
 }
 
 scene::Clutter clutter() {
@@ -611,8 +660,8 @@ TEST(FosterMaterials, TwinsWithTheGroundOfTheirMeanCostAccuracy) {
         for (std::size_t shares = 0; shares < 2; ++shares) {
           FosterMaterial twin = (*built)[1 + side];
           if (shares == 1) twin.water_slot = (*built)[0].water_slot;
-          const auto surface = physics::foster_surface(twin.network, twin.emissivity_frac,
-                                                       twin.base_k, kReferenceK);
+          const auto surface =
+              physics::foster_surface(twin.network, twin.emissivity_frac, twin.base_k, kReferenceK);
           physics::FosterState<double>& x = states[side][shares];
           const double offset_k = physics::foster_offset_k(x, surface);
           const auto drive = [&](const SurfaceForcing& f) {

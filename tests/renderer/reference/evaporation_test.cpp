@@ -248,9 +248,9 @@ double evaporated_mm(const reference::WaterCourse& course,
   const glm::dvec3 up(0.0, 0.0, 1.0);
   const auto rate_mm_s = [&](std::size_t i) {
     const reference::ClimateNode& node = nodes[i];
-    const double film_w_m2_k = physics::film_w_m2_k(
-        physics::air_film(node.flow), up, scene::roughness_factor(material.roughness),
-        course.face_k[i] - node.air_k);
+    const double film_w_m2_k = physics::film_w_m2_k(physics::air_film(node.flow), up,
+                                                    scene::roughness_factor(material.roughness),
+                                                    course.face_k[i] - node.air_k);
     const double open_mm_s = 0.622 * film_w_m2_k / (1013.0 * node.flow.pressure_pa) *
                              (reference::saturation_pa(course.face_k[i]) - node.vapour_pa);
     if (open_mm_s < 0.0) return course.water_mm[i] > 0.0 ? open_mm_s : 0.0;
@@ -319,7 +319,7 @@ TEST(ReferenceRain, GroundDriesAsTheReferenceDoes) {
         << name;
     EXPECT_GE(water.drained_mm, 0.0) << name;
     EXPECT_LE(*std::ranges::max_element(water.water_mm), *material->water_store_mm) << name;
-    // What evaporated is what the temperatures of the ground and the film of the air give.
+    // The temperatures of the ground and the film of the air give as much as evaporated.
     const double given_mm = evaporated_mm(water, climate->nodes(), *material);
     EXPECT_NEAR(water.evaporated_mm, given_mm, 0.01 + 0.02 * given_mm) << name;
     EXPECT_LT(rms_k, 0.4) << name;
@@ -328,7 +328,8 @@ TEST(ReferenceRain, GroundDriesAsTheReferenceDoes) {
     EXPECT_NEAR(model_h, truth_h, 0.1 + 0.1 * truth_h) << name;
     std::printf(
         "%-18s rms %.3f K, max %.3f K; up to %.1f K cooler than dry; wetness below 0.1 "
-        "after %.2f h, reference %.2f h; %.3f mm evaporated (%.3f by its course), %.3f mm drained\n",
+        "after %.2f h, reference %.2f h; %.3f mm evaporated (%.3f by its course), %.3f mm "
+        "drained\n",
         name, rms_k, worst_k, cooler_k, model_h, truth_h, water.evaporated_mm, given_mm,
         water.drained_mm);
   }
