@@ -24,14 +24,16 @@ std::vector<std::string> first_frame_warnings(const scene::ScenarioDesc& scenari
   const double frame_s = seconds(thermal_time_ns);
   // A table of one row is constant weather, at all times.
   if (scenario.weather.size() > 1 && scenario.weather.back().sim_time_ns < thermal_time_ns) {
+    // Rain of a row counts since the row before, so that nothing is known behind the last one.
+    const bool rains = scenario.weather.back().rain_mm_h > 0.0;
     out.push_back(
         fmt::format("{}: the weather covers {} s to {} s, but the frame at {} s needs it from {} s "
-                    "to {} s. The "
-                    "last row holds from {} s on",
+                    "to {} s. The last row holds from {} s on{}",
                     file, seconds(scenario.weather.front().sim_time_ns),
                     seconds(scenario.weather.back().sim_time_ns), frame_s,
                     seconds(thermal.history_start_ns - thermal.spin_up_ns), frame_s,
-                    seconds(scenario.weather.back().sim_time_ns)));
+                    seconds(scenario.weather.back().sim_time_ns),
+                    rains ? ", but for its rain, which ends there" : ""));
   }
   if (thermal_time_ns - thermal.history_start_ns < kShortHistoryNs) {
     const bool spun_up = thermal.model == scene::ThermalModel::foster && thermal.spin_up_ns > 0;

@@ -57,18 +57,15 @@ glm::dvec2 octahedral_from_unit(const glm::dvec3& n) noexcept {
   return p;
 }
 
-/// Returns the states of a steady profile between a surface temperature and the base.
-FosterState<double> initial_states(const FosterMaterial& material, double surface_k) noexcept {
+/// Returns the states of a steady profile between the surface's first temperature and the base.
+FosterState<double> initial_states(const FosterMaterial& material) noexcept {
   FosterState<double> x{};
-  const double flux_w_m2 = (surface_k - material.base_k) / material.network.resistance_m2k_w();
+  const double flux_w_m2 =
+      (material.initial_k - material.base_k) / material.network.resistance_m2k_w();
   for (std::size_t i = 0; i < material.network.count; ++i) {
     x[i] = material.network.modes[i].resistance_m2k_w * flux_w_m2;
   }
   return x;
-}
-
-FosterState<double> initial_states(const FosterMaterial& material) noexcept {
-  return initial_states(material, material.initial_k);
 }
 
 physics::FosterSurface<double> surface_of(const FosterMaterial& material,
@@ -167,42 +164,65 @@ FosterDrive<double> unshadowed_drive(const SurfaceForcing& f, const FosterMateri
 
 namespace {
 
-/// Returns true if rain on open ground of both materials dries alike.
+/// Returns true if rain on open ground of both materials dries alike. Sheets of any heat capacity
+/// have the same resistance, so that every mode counts.
 bool dry_alike(const FosterMaterial& a, const FosterMaterial& b) noexcept {
+  const auto same_mode = [](const physics::NetworkMode& x, const physics::NetworkMode& y) {
+    return x.tau_s == y.tau_s && x.resistance_m2k_w == y.resistance_m2k_w;
+  };
   return a.store == b.store && a.moisture == b.moisture && a.roughness == b.roughness &&
          a.solar_absorptance_frac == b.solar_absorptance_frac &&
          a.emissivity_frac == b.emissivity_frac && a.base_k == b.base_k &&
-         a.network.resistance_m2k_w() == b.network.resistance_m2k_w();
+         a.initial_k == b.initial_k && a.body == b.body && a.network.count == b.network.count &&
+         std::ranges::equal(a.network.modes, b.network.modes, same_mode);
 }
 
-/// Gives the materials that hold water their slots. Materials beyond the last slot share that of
-/// the store whose capacity is closest by ratio.
-void number_water(std::vector<FosterMaterial>& materials) {
-  std::vector<std::size_t> owners;
-  for (std::size_t m = 0; m < materials.size(); ++m) {
-    FosterMaterial& material = materials[m];
-    if (material.store.none()) continue;
-    const auto same = std::ranges::find_if(
-        owners, [&](std::size_t owner) { return dry_alike(materials[owner], material); });
-    if (same != owners.end()) {
-      material.water_slot = static_cast<int>(same - owners.begin());
-    } else if (owners.size() < physics::kWaterSlots) {
-      material.water_slot = static_cast<int>(owners.size());
-      owners.push_back(m);
-    } else {
-      const auto unlike = [&](std::size_t owner) {
-        const physics::WaterStore& store = materials[owner].store;
-        const bool other_kind = store.kind != material.store.kind;
-        return (other_kind ? 100.0 : 0.0) +
-               std::abs(std::log(store.capacity_mm / material.store.capacity_mm));
-      };
-      material.water_slot =
-          static_cast<int>(std::ranges::min_element(owners, {}, unlike) - owners.begin());
-    }
-  }
+/// Returns how little two stores have in common: the capacity by ratio, after the kind.
+double unlikeness(const physics::WaterStore& a, const physics::WaterStore& b) noexcept {
+  return (a.kind != b.kind ? 100.0 : 0.0) + std::abs(std::log(a.capacity_mm / b.capacity_mm));
 }
 
 }  // namespace
+
+void number_water(std::span<FosterMaterial> materials) {
+  std::vector<std::size_t> owners;
+  // Gives a material a slot if there is one for it.
+  const auto place = [&](std::size_t m) {
+    FosterMaterial& material = materials[m];
+    const auto same = std::ranges::find_if(
+        owners, [&](std::size_t owner) { return dry_alike(materials[owner], material); });
+    material.water_shared = same == owners.end() && owners.size() == physics::kWaterSlots;
+    if (material.water_shared) return;
+    material.water_slot = static_cast<int>(same - owners.begin());
+    if (same == owners.end()) owners.push_back(m);
+  };
+  std::vector<std::size_t> means(materials.size());
+  for (std::size_t m = 0; m < means.size(); ++m) means[m] = m;
+  for (std::size_t m = 0; m < materials.size(); ++m) {
+    const std::size_t twin = materials[m].first_twin;
+    if (twin != 0) means[twin] = means[twin + 1] = m;
+  }
+  // Twins get what the materials leave.
+  for (const bool twins : {false, true}) {
+    for (std::size_t m = 0; m < materials.size(); ++m) {
+      if (!materials[m].store.none() && (means[m] != m) == twins) place(m);
+    }
+  }
+  for (const bool twins : {false, true}) {
+    for (std::size_t m = 0; m < materials.size(); ++m) {
+      FosterMaterial& material = materials[m];
+      if (!material.water_shared || (means[m] != m) != twins) continue;
+      if (twins) {
+        material.water_slot = materials[means[m]].water_slot;
+        continue;
+      }
+      const auto most_alike = std::ranges::min_element(owners, {}, [&](std::size_t owner) {
+        return unlikeness(materials[owner].store, material.store);
+      });
+      material.water_slot = static_cast<int>(most_alike - owners.begin());
+    }
+  }
+}
 
 physics::Result<std::vector<FosterMaterial>> foster_materials(
     std::span<const scene::Material> materials, const scene::ThermalOptions& options) {
@@ -280,12 +300,18 @@ FosterHistory::FosterHistory(const scene::ScenarioDesc& scenario,
   }
   nodes_ns_.resize(kSpinUpSteps + 1);
   table_.resize(materials_.size() * grid_nodes_ * grid_nodes_);
-  // Take the first material of each slot for its ground.
+  // Take a material of its own in each slot for its ground.
+  std::array<const FosterMaterial*, physics::kWaterSlots> owners{};
   for (std::size_t m = 0; m <= materials_.size(); ++m) {
     const FosterMaterial& material = m < materials_.size() ? materials_[m] : surroundings_;
-    if (material.water_slot != static_cast<int>(water_grounds_.size())) continue;
-    water_grounds_.push_back(material);
-    water_surfaces_.push_back(surface_of(material, reference_k));
+    if (material.water_slot < 0 || material.water_shared) continue;
+    const FosterMaterial*& owner = owners[static_cast<std::size_t>(material.water_slot)];
+    if (owner == nullptr) owner = &material;
+  }
+  for (const FosterMaterial* const owner : owners) {
+    if (owner == nullptr) break;
+    water_grounds_.push_back(*owner);
+    water_surfaces_.push_back(surface_of(*owner, reference_k));
   }
   spin_up_gains_.resize(materials_.size());
   spin_up(environment, [](std::size_t rows, const auto& fill) {
@@ -305,16 +331,9 @@ SurfaceForcing FosterHistory::forcing(const physics::SunPosition& sun,
   return out;
 }
 
-void FosterHistory::look_for_water(const Environment& environment) noexcept {
-  has_water_ =
-      environment.rains() || std::ranges::any_of(water_grounds_, [](const FosterMaterial& ground) {
-        return ground.store.initial_mm > 0.0;
-      });
-}
-
 void FosterHistory::carry_water(const HistoryInterval& interval, IntervalForcing& out) noexcept {
-  if (!has_water_) return;
-  constexpr double kLongestPartS = 300.0;
+  // Parts last 300 s or less, but for the oldest, longest intervals, which have eight.
+  constexpr double kPartS = 300.0;
   constexpr std::size_t kFinestLevel = 3;
   const glm::dvec3 up(0.0, 0.0, 1.0);
   const double j_kg = physics::vaporisation_j_kg(out.begin.air_k);
@@ -322,14 +341,6 @@ void FosterHistory::carry_water(const HistoryInterval& interval, IntervalForcing
     const FosterMaterial& ground = water_grounds_[s];
     const physics::FosterSurface<double>& surface = water_surfaces_[s];
     WaterGround& now = ground_.water[s];
-    if (!now.followed) {
-      // Ground of which nothing was known has the temperature of the surroundings.
-      const double around_k = surroundings_.prescribed()
-                                  ? surroundings_.prescribed_k
-                                  : reference_k_ + physics::foster_offset_k(ground_.surroundings,
-                                                                            surroundings_surface_);
-      now = {initial_states(ground, around_k), 0.0, true};
-    }
     const double rain_mm = std::max(0.0, interval.rain_mm);
     const bool wet = rain_mm > 0.0 || now.water_mm > 0.0;
     // Set up the drive of ground that is as the material states it, and of ground wet all over.
@@ -372,7 +383,7 @@ void FosterHistory::carry_water(const HistoryInterval& interval, IntervalForcing
     };
     // Let heat and water take turns over short parts of the interval.
     std::size_t level = 0;
-    while (level < kFinestLevel && out.dt_s > kLongestPartS * static_cast<double>(1U << level)) {
+    while (level < kFinestLevel && out.dt_s > kPartS * static_cast<double>(1U << level)) {
       ++level;
     }
     const double parts = static_cast<double>(1U << level);
@@ -448,7 +459,6 @@ void FosterHistory::forcing_over(std::span<const std::int64_t> nodes_ns,
                                  std::span<IntervalForcing> out) noexcept {
   EMIT_CHECK_OP(out.size() + 1, ==, nodes_ns.size());
   EMIT_DCHECK(std::ranges::is_sorted(nodes_ns));
-  look_for_water(environment);
   ground_ = ground_at_start_;
   for (std::size_t i = 0; i < out.size(); ++i) {
     carry(interval_between(nodes_ns[i], nodes_ns[i + 1], environment), tolerance_k_, out[i]);
@@ -456,11 +466,9 @@ void FosterHistory::forcing_over(std::span<const std::int64_t> nodes_ns,
 }
 
 void FosterHistory::spin_up_surroundings(const Environment& environment) noexcept {
-  look_for_water(environment);
   ground_ = {};
-  for (std::size_t s = 0; s < water_grounds_.size() && has_water_; ++s) {
-    ground_.water[s] = {initial_states(water_grounds_[s]), water_grounds_[s].store.initial_mm,
-                        true};
+  for (std::size_t s = 0; s < water_grounds_.size(); ++s) {
+    ground_.water[s] = {initial_states(water_grounds_[s]), water_grounds_[s].store.initial_mm};
   }
   ground_.surroundings =
       surroundings_.prescribed() ? FosterState<double>{} : initial_states(surroundings_);
@@ -504,7 +512,6 @@ FosterState<double> FosterHistory::start_states(std::size_t material,
 IntervalForcing FosterHistory::extend(std::int64_t begin_ns, std::int64_t end_ns,
                                       const Environment& environment) noexcept {
   IntervalForcing out;
-  look_for_water(environment);
   carry(interval_between(begin_ns, end_ns, environment), tolerance_k_, out);
   return out;
 }
@@ -573,7 +580,6 @@ bool FosterHistory::update(const StepPlan& plan, const Environment& environment)
       changed = true;
     }
   }
-  look_for_water(environment);
   ground_ = ground_at_start_;
   const auto intervals = plan.intervals();
   for (std::size_t i = 0; i < intervals.size() && i < intervals_.size(); ++i) {

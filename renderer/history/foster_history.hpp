@@ -36,6 +36,12 @@ namespace emit::renderer {
                                                             double reference_k,
                                                             double offset_k) noexcept;
 
+/// Gives the materials that hold water their slots: at first materials that are no twins, then
+/// twins as far as slots are left. What gets none has `water_shared` and the slot of another
+/// material: a twin that of its mean, others that whose store is most alike. Setup only.
+/// @pre the slots are not set, but first_twin is
+void number_water(std::span<FosterMaterial> materials);
+
 /// History of the surroundings' temperature, and table of the states in which unshadowed surfaces
 /// begin the history. Owner: Renderer.
 /// Thread: the renderer's.  Real time: update is RT-safe and takes microseconds. When the host
@@ -108,10 +114,9 @@ class FosterHistory {
   void spin_up_surroundings(const Environment& environment) noexcept;
   /// Advances the surroundings over one interval and writes its forcing.
   void carry(const HistoryInterval& interval, double tolerance_k, IntervalForcing& out) noexcept;
-  /// Advances the water of the grounds over one interval and writes its wetness.
+  /// Advances heat and water of the grounds over one interval and writes their wetness. Dry grounds
+  /// advance too, since a host may let it rain at any instant.
   void carry_water(const HistoryInterval& interval, IntervalForcing& out) noexcept;
-  /// Notes whether there is water to follow.
-  void look_for_water(const Environment& environment) noexcept;
   [[nodiscard]] SurfaceForcing forcing(const physics::SunPosition& sun,
                                        const physics::Forcing& weather) const noexcept;
 
@@ -128,7 +133,6 @@ class FosterHistory {
   GroundState ground_at_start_;                ///< state at the history's start
   std::vector<FosterMaterial> water_grounds_;  ///< a material of each slot
   std::vector<physics::FosterSurface<double>> water_surfaces_;
-  bool has_water_ = false;  ///< it rains, or some ground starts moist
   double surroundings_now_k_ = 0.0;
 
   std::vector<IntervalForcing> spin_up_;  ///< intervals up to the instant of the table

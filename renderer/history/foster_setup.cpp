@@ -55,7 +55,36 @@ physics::Result<std::vector<FosterMaterial>> build_foster_materials(
   auto made = foster_materials(all, scenario.thermal);
   if (!made) return made;
   for (std::size_t m = 0; m < materials.size(); ++m) (*made)[m].first_twin = first_twins[m];
+  for (FosterMaterial& material : *made) material.water_slot = -1;
+  number_water(*made);
   return made;
+}
+
+std::string shared_water_warning(const scene::ScenarioDesc& scenario,
+                                 std::span<const scene::Material> materials,
+                                 std::span<const FosterMaterial> built) {
+  const bool gets_wet =
+      std::ranges::any_of(scenario.weather,
+                          [](const scene::WeatherSample& row) { return row.rain_mm_h > 0.0; }) ||
+      std::ranges::any_of(
+          built, [](const FosterMaterial& material) { return material.store.initial_mm > 0.0; });
+  if (!gets_wet) return {};
+  std::vector<std::string> names;
+  for (std::size_t m = 0; m < materials.size(); ++m) {
+    if (built[m].water_shared) {
+      names.push_back(fmt::format("'{}' dries as another material does", materials[m].name));
+    }
+  }
+  if (built.back().water_shared) names.push_back("the surroundings dry as another material does");
+  for (std::size_t m = 0; m < materials.size(); ++m) {
+    const std::size_t twin = built[m].first_twin;
+    if (twin != 0 && (built[twin].water_shared || built[twin + 1].water_shared)) {
+      names.push_back(fmt::format("the clutter of '{}' dries as its mean does", materials[m].name));
+    }
+  }
+  if (names.empty()) return {};
+  return fmt::format("{}: more materials hold rain water than the {} whose drying is followed: {}",
+                     scenario.file.string(), physics::kWaterSlots, fmt::join(names, ", "));
 }
 
 std::optional<FosterHistory> make_foster(const scene::ScenarioDesc& scenario,

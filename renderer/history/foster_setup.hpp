@@ -2,6 +2,7 @@
 #pragma once
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "emit/physics/error.hpp"
@@ -29,6 +30,13 @@ inline constexpr double kTwinSd = 1.5;
 /// Errors (config) name the material.
 [[nodiscard]] physics::Result<std::vector<FosterMaterial>> build_foster_materials(
     const scene::ScenarioDesc& scenario, std::span<const scene::Material> materials);
+
+/// Returns a warning that names the materials that dry as others do because there are too few slots
+/// for water; empty if there are none, or if nothing is known to get wet. `built` is the result of
+/// build_foster_materials() for the same `materials`, and not empty.
+[[nodiscard]] std::string shared_water_warning(const scene::ScenarioDesc& scenario,
+                                               std::span<const scene::Material> materials,
+                                               std::span<const FosterMaterial> built);
 
 /// Runs the spin-up with the `materials` of build_foster_materials(). Returns nothing for emit2014.
 [[nodiscard]] std::optional<FosterHistory> make_foster(const scene::ScenarioDesc& scenario,

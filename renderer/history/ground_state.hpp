@@ -11,7 +11,6 @@ namespace emit::renderer {
 struct WaterGround {
   physics::FosterState<double> modes_k{};
   double water_mm = 0.0;
-  bool followed = false;  ///< false: there has been no water yet, and the modes are not known
 };
 
 /// State of the open, level ground around the scene at an instant: that of the surroundings, and

@@ -292,6 +292,23 @@ std::size_t planes_bytes(const scene::ScenarioDesc& scenario, const OutputOption
   return (bytes + kBlockAlignment - 1) / kBlockAlignment * kBlockAlignment;
 }
 
+/// Returns the warning that rain leaves materials dry, which names what it is due to.
+std::string rain_warning(const scene::ScenarioDesc& scenario, const scene::SceneGeometry& geometry,
+                         std::span<const std::uint32_t> bare) {
+  constexpr const char* kFrames = "frames within six hours of rain carry 'degraded'";
+  const std::string file = scenario.file.string();
+  if (scenario.thermal.model == scene::ThermalModel::emit2014) {
+    return fmt::format(
+        "{}: it rains, but thermal.model \"emit2014\" has no rain: everything stays dry, and {}",
+        file, kFrames);
+  }
+  std::vector<std::string_view> names;
+  for (const std::uint32_t m : bare) names.push_back(geometry.materials[m].name);
+  return fmt::format(
+      "{}: it rains, but '{}' state{} no 'water_store_mm': rain leaves them dry, and {}", file,
+      fmt::join(names, "', '"), names.size() == 1 ? "s" : "", kFrames);
+}
+
 GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext context,
                        const scene::SceneGeometry& geometry, const OutputOptions& output,
                        BandModel bands, std::optional<GasModel> gas, ClutterFields clutter,
@@ -324,12 +341,7 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
   const std::vector<std::uint32_t> bare = scene::materials_without_rain(scenario.thermal, geometry);
   unknown_wet_ = static_cast<std::uint32_t>(bare.size());
   if (!bare.empty() && history_.environment.rains()) {
-    std::vector<std::string_view> names;
-    for (const std::uint32_t m : bare) names.push_back(geometry.materials[m].name);
-    scene_stats_.warnings.push_back(fmt::format(
-        "{}: it rains, but '{}' state{} no 'water_store_mm' that thermal.model \"foster\" could "
-        "use: rain leaves them dry, and frames within six hours of rain carry 'degraded'",
-        scenario.file.string(), fmt::join(names, "', '"), names.size() == 1 ? "s" : ""));
+    scene_stats_.warnings.push_back(rain_warning(scenario, geometry, bare));
   }
   if (!scenario.contacts.empty()) {
     scene_stats_.warnings.push_back(fmt::format(
@@ -803,6 +815,10 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
 
   auto foster = build_foster_materials(scenario, geometry->materials);
   if (!foster) return tl::unexpected(std::move(foster.error()));
+  if (!foster->empty()) {
+    const std::string shared = shared_water_warning(scenario, geometry->materials, *foster);
+    if (!shared.empty()) geometry->warnings.push_back(shared);
+  }
 
   auto clutter = ClutterFields::build(geometry->materials);
   if (!clutter) return tl::unexpected(std::move(clutter.error()));

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "config/config_support.hpp"
+#include "emit/physics/climate/rain.hpp"
 #include "emit/physics/evaporation.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/physics/weather.hpp"
@@ -87,6 +88,37 @@ TEST_F(Weather, one_row_is_constant_weather_at_all_times) {
   const auto loaded = load(std::string(kHeader) + "5000,0,0,330,290,2,0\n");
   EXPECT_EQ(loaded.weather.size(), 1U);
   EXPECT_THAT(loaded.warnings, IsEmpty());
+}
+
+TEST_F(Weather, rain_of_the_first_row_has_no_begin_and_is_named) {
+  const auto table = [](double from_h, double first_mm_h, double second_mm_h) {
+    std::string csv =
+        "time_s,dni_w_m2,dhi_w_m2,longwave_down_w_m2,air_k,wind_m_s,cloud_frac,rain_mm_h\n";
+    for (double h = from_h; h <= 24.0; h += 1.0) {
+      const double mm_h = h == from_h ? first_mm_h : h == from_h + 1.0 ? second_mm_h : 0.0;
+      csv += fmt::format("{},0,0,330,290,2,0,{}\n", 3600.0 * h, mm_h);
+    }
+    return csv;
+  };
+  const auto rain_mm = [](const scene::ScenarioDesc& loaded) {
+    return physics::RainDepth(loaded.weather).at_mm(24 * kHourNs);
+  };
+  const auto is_named = HasSubstr("states rain of 2.5 mm/h, which is left out");
+  const auto whole = load(table(-48, 2.5, 4.0));
+  EXPECT_THAT(whole.warnings,
+              ElementsAre(AllOf(HasSubstr("w.csv: the first row (-172800 s)"), is_named)));
+  EXPECT_DOUBLE_EQ(rain_mm(whole), 4.0);
+  // The rows that the models make before the table are dry, and rain of the first row does not
+  // reach back into them.
+  const auto late = load(table(6, 2.5, 4.0));
+  ASSERT_EQ(late.warnings.size(), 2U);
+  EXPECT_THAT(late.warnings[0], AllOf(HasSubstr("w.csv: the first row (21600 s)"), is_named));
+  EXPECT_DOUBLE_EQ(rain_mm(late), 4.0);
+  // Rain of later rows is complete, and one row is rain at all times.
+  EXPECT_THAT(load(table(-48, 0.0, 4.0)).warnings, IsEmpty());
+  const auto one = load(table(24, 2.5, 0.0));
+  EXPECT_THAT(one.warnings, IsEmpty());
+  EXPECT_DOUBLE_EQ(rain_mm(one), 60.0);
 }
 
 /// Test that the models go on from the table: where the models made the table, they are found

@@ -20,7 +20,8 @@ const std::vector<SectionDoc>& scenario_sections() {
           weather_keys(), WeatherDraft{}),
       section_doc("weather.sample", true,
                   "Weather at one instant. It is linear between samples and constant behind the "
-                  "last one. The columns of the CSV file have the same names.",
+                  "last one, but for rain, which ends with its row. The columns of the CSV file "
+                  "have the same names.",
                   weather_sample_keys(), scene::WeatherSample{}),
       section_doc("atmosphere", false, "The air between surface and sensor.", atmosphere_keys(),
                   AtmosphereDraft{}),

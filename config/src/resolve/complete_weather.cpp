@@ -174,6 +174,18 @@ ClearSky fitted(std::span<const WeatherSample> rows, const ModelSky& sky,
   return model;
 }
 
+/// Leaves out the rain of the first row and warns of it: rain counts since the row before, so
+/// nobody knows when this rain began.
+void leave_out_first_rain(std::string_view name, scene::ScenarioDesc& scenario) {
+  WeatherSample& first = scenario.weather.front();
+  if (!(first.rain_mm_h > 0.0)) return;
+  scenario.warnings.push_back(
+      fmt::format("{}: the first row ({} s) states rain of {:.3g} mm/h, which is left out: "
+                  "'rain_mm_h' counts since the row before, and there is none",
+                  name, seconds(first.sim_time_ns), first.rain_mm_h));
+  first.rain_mm_h = 0.0;
+}
+
 /// Warns of the gaps from `from_ns` on.
 void report_gaps(std::string_view name, std::int64_t from_ns, std::int64_t usual_ns,
                  scene::ScenarioDesc& scenario) {
@@ -233,6 +245,7 @@ bool complete_weather(std::string_view name, const StatedClearSky& stated,
         fmt::format("{}: {}. The clear-sky models make all of the weather", name, spans));
     return true;
   }
+  leave_out_first_rain(name, scenario);
   const std::int64_t usual_ns = usual_spacing_ns(rows);
   report_gaps(name, from_ns, usual_ns, scenario);
   // Over less than one step the first row may stand in.

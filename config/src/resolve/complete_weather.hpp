@@ -25,9 +25,10 @@ struct StatedClearSky {
 /// - where the table ends before that start, or begins more than 400 days behind it, the clear-sky
 ///   models replace it.
 /// Parameters of the models that `stated` does not name are fitted to the table's nearest day and
-/// written to scenario.clear_sky. Both cases, and gaps between the rows, give one warning each in
-/// scenario.warnings, which begins with `name`, the table's name for messages.
-/// Returns true when the clear-sky models are used.
+/// written to scenario.clear_sky. Both cases, gaps between the rows, and rain of the first row,
+/// which is left out because it has no begin, give one warning each in scenario.warnings, which
+/// begins with `name`, the table's name for messages. Returns true when the clear-sky models are
+/// used.
 /// @pre scenario.weather is empty or ascending; place, epoch and thermal options are set.
 bool complete_weather(std::string_view name, const StatedClearSky& stated,
                       scene::ScenarioDesc& scenario);

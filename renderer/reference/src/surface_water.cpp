@@ -43,27 +43,40 @@ double warm_share(const WaterStore& store, double water_mm, const ClimateNode& n
                                               : 1.0 / (1.0 + soil_resistance(store, share, node));
 }
 
-/// Water after a stretch in small steps of second order (Heun's), never below 0 or above the store.
-double later_mm(const WaterStore& store, double water_mm, double rain_mm_s, double begin_mm_s,
-                double end_mm_s, double dt_s, const ClimateNode& node) noexcept {
+/// Water after a stretch, and where the rest of it went.
+struct Stretch {
+  double water_mm = 0.0;
+  double evaporated_mm = 0.0;  ///< below 0: dew
+  double drained_mm = 0.0;
+};
+
+/// Advances the water over a stretch in small steps of second order (Heun's), never below 0 or
+/// above the store. What evaporates is the sum of the rates, less what was not there; what drains
+/// is the sum of what the store could not take.
+Stretch later(const WaterStore& store, double water_mm, double rain_mm_s, double begin_mm_s,
+              double end_mm_s, double dt_s, const ClimateNode& node) noexcept {
   constexpr double kStepS = 1.0;
   const auto steps = static_cast<int>(std::max(1.0, std::ceil(dt_s / kStepS)));
   const double h = dt_s / steps;
-  const auto rate = [&](double mm, double frac) {
+  const auto evaporation_mm_s = [&](double mm, double frac) {
     const double open_mm_s = begin_mm_s + frac * (end_mm_s - begin_mm_s);
     // Dew forms on what is wet.
     const double share = open_mm_s > 0.0 ? warm_share(store, mm, node) : (mm > 0.0 ? 1.0 : 0.0);
-    return rain_mm_s - share * open_mm_s;
+    return share * open_mm_s;
   };
-  double mm = water_mm;
+  Stretch out{.water_mm = water_mm};
   for (int i = 0; i < steps; ++i) {
-    const double from = static_cast<double>(i) / steps;
-    const double to = static_cast<double>(i + 1) / steps;
-    const double slope = rate(mm, from);
-    const double next = std::clamp(mm + h * slope, 0.0, store.capacity_mm);
-    mm = std::clamp(mm + 0.5 * h * (slope + rate(next, to)), 0.0, store.capacity_mm);
+    const double begin = evaporation_mm_s(out.water_mm, static_cast<double>(i) / steps);
+    const double next_mm =
+        std::clamp(out.water_mm + h * (rain_mm_s - begin), 0.0, store.capacity_mm);
+    const double end = evaporation_mm_s(next_mm, static_cast<double>(i + 1) / steps);
+    const double mean_mm_s = 0.5 * (begin + end);
+    const double free_mm = out.water_mm + h * (rain_mm_s - mean_mm_s);
+    out.evaporated_mm += h * mean_mm_s + std::min(0.0, free_mm);
+    out.drained_mm += std::max(0.0, free_mm - store.capacity_mm);
+    out.water_mm = std::clamp(free_mm, 0.0, store.capacity_mm);
   }
-  return mm;
+  return out;
 }
 
 }  // namespace
@@ -113,14 +126,15 @@ WaterCourse water_course(std::span<const ClimateNode> nodes, const scene::Materi
       const double rain_mm_s = (b.rain_mm - a.rain_mm) / dt_s;
       const double begin_mm_s = open_mm_s(a);
       const double expected_mm =
-          later_mm(store, water_mm, rain_mm_s, begin_mm_s, begin_mm_s, dt_s, a);
+          later(store, water_mm, rain_mm_s, begin_mm_s, begin_mm_s, dt_s, a).water_mm;
       const double end_s = static_cast<double>(b.time_ns - nodes.front().time_ns) * 1e-9;
       solver.advance({solver.time_s(), end_s, face_at(a, warm_share(store, water_mm, a)),
                       face_at(b, warm_share(store, expected_mm, b))},
                      surface.emissivity_frac);
-      const double before_mm = water_mm;
-      water_mm = later_mm(store, water_mm, rain_mm_s, begin_mm_s, open_mm_s(b), dt_s, b);
-      out.lost_mm += b.rain_mm - a.rain_mm - (water_mm - before_mm);
+      const Stretch after = later(store, water_mm, rain_mm_s, begin_mm_s, open_mm_s(b), dt_s, b);
+      water_mm = after.water_mm;
+      out.evaporated_mm += after.evaporated_mm;
+      out.drained_mm += after.drained_mm;
     }
     keep(b);
   }

@@ -101,11 +101,9 @@ template <class T>
 }
 [[nodiscard]] inline GroundState between(const GroundState& a, const GroundState& b,
                                          double frac) noexcept {
-  GroundState out = b;
+  GroundState out;
   out.surroundings = between(a.surroundings, b.surroundings, frac);
   for (std::size_t s = 0; s < out.water.size(); ++s) {
-    // Ground that is followed from some instant on has no state before.
-    if (!a.water[s].followed) continue;
     out.water[s].modes_k = between(a.water[s].modes_k, b.water[s].modes_k, frac);
     out.water[s].water_mm = between(a.water[s].water_mm, b.water[s].water_mm, frac);
   }

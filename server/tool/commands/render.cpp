@@ -332,9 +332,11 @@ void Rendering::print_warnings(const renderer::FrameView& view) const {
                     frame, view.stats.plain_targets));
   }
   if (view.stats.unknown_wet > 0) {
-    warn(
-        fmt::format("{}{} materials are shown dry after rain, because they state no store of water",
-                    frame, view.stats.unknown_wet));
+    warn(fmt::format("{}{} materials are shown dry after rain, because {}", frame,
+                     view.stats.unknown_wet,
+                     scenario_.thermal.model == scene::ThermalModel::emit2014
+                         ? "thermal.model \"emit2014\" has no rain"
+                         : "they state no store of water"));
   }
 }
 

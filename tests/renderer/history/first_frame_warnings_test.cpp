@@ -4,11 +4,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "emit/physics/climate/rain.hpp"
+
 namespace emit::renderer {
 namespace {
 
 using testing::AllOf;
 using testing::ElementsAre;
+using testing::EndsWith;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
@@ -48,6 +51,15 @@ TEST(FirstFrameWarnings, AWeatherTableThatEndsBeforeTheFrameIsNamed) {
       first_frame_warnings(s, 12 * kHourNs),
       ElementsAre(HasSubstr("the weather covers -172800 s to 7200 s, but the frame at 43200 "
                             "s needs it from -172800 s to 43200 s")));
+  EXPECT_THAT(first_frame_warnings(s, 12 * kHourNs)[0], EndsWith("holds from 7200 s on"));
+  // Rain ends with the row that states it.
+  s.weather[0].rain_mm_h = 3.0;
+  EXPECT_THAT(first_frame_warnings(s, 12 * kHourNs)[0], EndsWith("holds from 7200 s on"));
+  s.weather[1].rain_mm_h = 3.0;
+  EXPECT_EQ(physics::RainDepth(s.weather).at_mm(12 * kHourNs), 3.0 * 50.0);
+  EXPECT_THAT(first_frame_warnings(s, 12 * kHourNs)[0],
+              EndsWith("holds from 7200 s on, but for its rain, which ends there"));
+  EXPECT_THAT(first_frame_warnings(s, 2 * kHourNs), IsEmpty());
   s.weather.resize(1);  // constant weather, at all times
   EXPECT_THAT(first_frame_warnings(s, 12 * kHourNs), IsEmpty());
 }

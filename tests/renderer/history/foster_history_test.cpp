@@ -4,11 +4,19 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
+#include <functional>
 #include <glm/geometric.hpp>
 #include <random>
+#include <string_view>
+#include <utility>
 
 #include "emit/physics/constants.hpp"
+#include "emit/physics/sun.hpp"
+#include "emit/physics/weather.hpp"
+#include "history/foster_setup.hpp"
 #include "support/times.hpp"
 
 namespace emit::renderer {
@@ -324,6 +332,66 @@ TEST(FosterHistory, RainWetsWhatHoldsWaterAndNothingElse) {
   EXPECT_EQ(history.surroundings_now_k(), dry_k);
 }
 
+TEST(FosterHistory, GroundBeforeTheFirstRainOfAHostIsItsOwn) {
+  // Grounds that differ from the surroundings by colour, kind and thickness.
+  scene::ScenarioDesc s = scenario(-12.0 * 3600.0);
+  s.materials[0].solar_absorptance_frac = 0.2;
+  s.materials[1].water_store_mm = 0.48;
+  s.materials[1].solar_absorptance_frac = 0.9;
+  s.materials[2].water_store_mm = 0.48;
+  s.materials[2].sheet = true;
+  s.materials[3].water_store_mm = 2.0;
+  s.materials.push_back(s.materials[1]);
+  s.materials[4].water_store_mm = 19.0;
+  s.materials[4].readily_evaporable_mm = 9.0;
+  const std::int64_t start_ns = 4 * 3600 * kSecondNs;
+  for (const std::int64_t wait_s : {60, 1800, 7200}) {
+    const std::int64_t rain_ns = start_ns + wait_s * kSecondNs;
+    const auto let_it_rain = [&](Environment& environment) {
+      scene::WeatherSample live;
+      const physics::Forcing now = environment.forcing_at(rain_ns, environment.sun_at(rain_ns));
+      live.direct_normal_w_m2 = now.direct_normal_w_m2;
+      live.diffuse_horizontal_w_m2 = now.diffuse_horizontal_w_m2;
+      live.longwave_down_w_m2 = now.longwave_down_w_m2;
+      live.air_k = now.air_k;
+      live.wind_m_s = now.wind_m_s;
+      live.sim_time_ns = rain_ns;
+      live.rain_mm_h = 12.0;
+      EXPECT_TRUE(environment.append(live));
+      live.sim_time_ns = rain_ns + 600 * kSecondNs;
+      live.rain_mm_h = 0.0;
+      EXPECT_TRUE(environment.append(live));
+    };
+    // One history learns of the rain when it falls, the other one knows it from the start.
+    Environment live(s);
+    FosterHistory told = history_of(s, live);
+    Environment all(s);
+    let_it_rain(all);
+    FosterHistory knew = history_of(s, all);
+    StepPlan plan(s.thermal);
+    plan.update(start_ns, live, {});
+    told.update(plan, live);
+    knew.update(plan, all);
+    IntervalForcing is;
+    IntervalForcing should;
+    std::int64_t at_ns = start_ns;
+    for (; at_ns < rain_ns + 4200 * kSecondNs; at_ns += 60 * kSecondNs) {
+      if (at_ns == rain_ns) let_it_rain(live);
+      is = told.extend(at_ns, at_ns + 60 * kSecondNs, live);
+      should = knew.extend(at_ns, at_ns + 60 * kSecondNs, all);
+    }
+    // A later update computes the same course with other steps.
+    plan.update(at_ns, live, {});
+    told.update(plan, live);
+    for (std::size_t slot = 0; slot < 4; ++slot) {
+      EXPECT_EQ(is.end.wet_frac[slot], should.end.wet_frac[slot]) << slot << " " << wait_s;
+      EXPECT_NEAR(told.intervals().back().end.wet_frac[slot], is.end.wet_frac[slot], 0.04)
+          << slot << " " << wait_s;
+    }
+    EXPECT_GT(is.end.wet_frac[3], 0.1);
+  }
+}
+
 TEST(FosterHistory, SoilStartsAsWetAsStatedAndDriesWithoutRain) {
   scene::ScenarioDesc s = scenario(0.0);
   s.materials[0].water_store_mm = 19.0;
@@ -361,6 +429,256 @@ TEST(FosterMaterials, NameTheMaterialWithoutLayers) {
   const auto materials = foster_materials(s.materials, s.thermal);
   ASSERT_FALSE(materials);
   EXPECT_NE(materials.error().text.find("'concrete'"), std::string::npos);
+}
+
+TEST(FosterMaterials, ShareGroundOnlyWhereAllThatDriesItIsTheSame) {
+  using Change = std::pair<const char*, std::function<void(scene::Material&)>>;
+  const Change changes[] = {
+      {"store", [](scene::Material& m) { m.water_store_mm = 0.49; }},
+      {"kind of store", [](scene::Material& m) { m.readily_evaporable_mm = 0.2; }},
+      {"absorptance", [](scene::Material& m) { m.solar_absorptance_frac = 0.79; }},
+      {"emissivity", [](scene::Material& m) { m.emissivity_frac = 0.91; }},
+      {"roughness", [](scene::Material& m) { m.roughness = scene::Roughness::smooth; }},
+      {"leaves", [](scene::Material& m) { m.surface_resistance_s_m = 70.0; }},
+      {"base", [](scene::Material& m) { m.base_k = 287.15; }},
+      {"kind of base", [](scene::Material& m) { m.base = scene::BaseKind::body; }},
+      {"start", [](scene::Material& m) { m.initial_k = 280.0; }},
+      // The resistance stays.
+      {"heat capacity", [](scene::Material& m) { m.layers[0].density_kg_m3 *= 2.0; }},
+      {"order of layers", [](scene::Material& m) { std::swap(m.layers[0], m.layers[1]); }},
+      {"sheet", [](scene::Material& m) { m.sheet = !m.sheet; }}};
+  for (const bool sheet : {false, true}) {
+    scene::ScenarioDesc s = scenario(0.0);
+    scene::Material& ground = s.materials[1];
+    ground.layers = {{0.1, 1.7, 2300, 878}, {0.9, 0.7, 1200, 878}};
+    ground.water_store_mm = 0.48;
+    ground.sheet = sheet;
+    for (const auto& [name, change] : changes) {
+      // A sheet rests on nothing, and its capacity does not depend on the order of its layers.
+      const std::string_view key = name;
+      if (sheet && (key == "order of layers" || key == "kind of base")) continue;
+      scene::Material other = ground;
+      change(other);
+      const auto built = foster_materials(std::vector{ground, other, ground}, s.thermal);
+      ASSERT_TRUE(built.has_value());
+      EXPECT_EQ((*built)[1].water_slot, 1) << name << (sheet ? " of a sheet" : "");
+      EXPECT_EQ((*built)[2].water_slot, 0) << name << (sheet ? " of a sheet" : "");
+    }
+  }
+}
+
+/// Returns the scenario with its clear sky as an hourly table, in which it rains 2 mm in one hour
+/// that begins at 06:00 UTC + `rain_h`.
+scene::ScenarioDesc shower(std::int64_t rain_h) {
+  scene::ScenarioDesc s = scenario(0.0);
+  s.thermal.history_start_ns = -24 * 3600 * kSecondNs;
+  s.thermal.steps = 48;
+  const physics::GeoPlace place{physics::Radians(s.place.lat_rad),
+                                physics::Radians(s.place.lon_rad),
+                                physics::Metres(s.place.height_m)};
+  for (std::int64_t hour = -72; hour <= 24; ++hour) {
+    const std::int64_t utc_ns = s.epoch_utc_ns + hour * 3600 * kSecondNs;
+    const physics::Forcing f = physics::forcing_from_clear_sky(
+        s.clear_sky, place, physics::sun_position(utc_ns, place), utc_ns);
+    scene::WeatherSample row;
+    row.sim_time_ns = hour * 3600 * kSecondNs;
+    row.direct_normal_w_m2 = f.direct_normal_w_m2;
+    row.diffuse_horizontal_w_m2 = f.diffuse_horizontal_w_m2;
+    row.longwave_down_w_m2 = f.longwave_down_w_m2;
+    row.air_k = f.air_k;
+    row.wind_m_s = f.wind_m_s;
+    row.rain_mm_h = hour == rain_h + 1 ? 2.0 : 0.0;
+    s.weather.push_back(row);
+  }
+  return s;
+}
+
+TEST(FosterHistory, ThickAndThinSheetsDryByThemselves) {
+  // Roofs of foam and of slate, with a shower before a clear morning.
+  scene::ScenarioDesc s = shower(0);
+  scene::Material foam = material("foam", {{0.02, 0.04, 20, 1400}});
+  foam.sheet = true;
+  foam.water_store_mm = 0.48;
+  scene::Material slate = foam;
+  slate.layers[0].density_kg_m3 = 2500.0;
+  const Environment environment(s);
+  const auto wet_of = [&](std::vector<scene::Material> materials) {
+    // The first material is that of the surroundings, which hold no water.
+    materials.insert(materials.begin(), scenario(0.0).materials[0]);
+    s.materials = std::move(materials);
+    FosterHistory history = history_of(s, environment);
+    StepPlan plan(s.thermal);
+    plan.update(2 * 3600 * kSecondNs, environment, {});
+    history.update(plan, environment);
+    std::vector<double> out;
+    for (const FosterMaterial& m : history.materials().subspan(1)) {
+      out.push_back(
+          history.intervals().back().end.wet_frac[static_cast<std::size_t>(m.water_slot)]);
+    }
+    return out;
+  };
+  const double foam_frac = wet_of({foam})[0];
+  const double slate_frac = wet_of({slate})[0];
+  const std::vector<double> both_frac = wet_of({foam, slate});
+  EXPECT_GT(std::abs(foam_frac - slate_frac), 0.05);
+  EXPECT_EQ(both_frac[0], foam_frac);
+  EXPECT_EQ(both_frac[1], slate_frac);
+}
+
+TEST(FosterHistory, SoilAfterOldRainIsThatOfEvenSteps) {
+  // The history that scenarios have by themselves, whose oldest intervals last hours.
+  constexpr std::int64_t kHourNs = 3600 * kSecondNs;
+  double worst_k = 0.0;
+  double longest_s = 0.0;
+  for (const std::int64_t ago_h : {20, 36, 60}) {
+    const std::int64_t now_ns = 6 * kHourNs;
+    scene::ScenarioDesc s = shower(6 - ago_h);
+    s.weather.insert(s.weather.begin(), s.weather.front());
+    s.weather.front().sim_time_ns = -96 * kHourNs;
+    s.thermal.history_start_ns = now_ns - 84 * kHourNs;
+    s.thermal.spin_up_ns = 0;
+    s.materials[0].layers = {{0.4, 0.6, 1600, 1000}};
+    s.materials[0].water_store_mm = 19.0;
+    s.materials[0].readily_evaporable_mm = 9.0;
+    for (scene::WeatherSample& row : s.weather) row.rain_mm_h *= 5.0;
+    const Environment environment(s);
+    const auto ground = [&](scene::StepSpacing spacing, std::uint32_t steps) {
+      s.thermal.spacing = spacing;
+      s.thermal.steps = steps;
+      FosterHistory history = history_of(s, environment);
+      StepPlan plan(s.thermal);
+      plan.update(now_ns, environment, {});
+      history.update(plan, environment);
+      if (spacing == scene::StepSpacing::geometric) {
+        longest_s = history.intervals().front().dt_s;
+      }
+      return std::pair(history.surroundings_now_k(), history.surroundings().water[0].water_mm);
+    };
+    const auto [is_k, is_mm] = ground(scene::StepSpacing::geometric, 64);
+    const auto [even_k, even_mm] = ground(scene::StepSpacing::uniform, 1008);
+    for (scene::WeatherSample& row : s.weather) row.rain_mm_h = 0.0;
+    const Environment dry(s);
+    FosterHistory history = history_of(s, dry);
+    StepPlan plan(s.thermal);
+    plan.update(now_ns, dry, {});
+    history.update(plan, dry);
+    std::printf(
+        "soil %d h after rain: %.3f K and %.3f mm, even steps %.3f K and %.3f mm, dry %.2f K\n",
+        static_cast<int>(ago_h), is_k, is_mm, even_k, even_mm, history.surroundings_now_k());
+    EXPECT_GT(even_mm, 0.5);
+    EXPECT_GT(history.surroundings_now_k() - even_k, 1.0);
+    worst_k = std::max(worst_k, std::abs(is_k - even_k));
+  }
+  EXPECT_LT(worst_k, 0.1);
+  EXPECT_NEAR(longest_s / 8.0, 4206.0, 1.0);
+}
+
+scene::Clutter clutter() {
+  scene::Clutter out;
+  out.solar_absorptance_sd_frac = 0.05;
+  out.inertia_sd_ln = 0.5 * std::log(2.0);
+  return out;
+}
+
+TEST(FosterMaterials, TwinsTakeTheSlotsThatTheMaterialsLeave) {
+  for (const std::size_t count : {2, 4, 9}) {
+    scene::ScenarioDesc s = shower(0);
+    const scene::Material road = s.materials[0];
+    s.materials.clear();
+    for (std::size_t m = 0; m < count; ++m) {
+      s.materials.push_back(road);
+      s.materials[m].name = "road " + std::to_string(m);
+      s.materials[m].water_store_mm = 0.3 + 0.1 * static_cast<double>(m);
+      s.materials[m].clutter = clutter();
+    }
+    s.default_material = "road 0";
+    s.file = "s.toml";
+    const auto built = build_foster_materials(s, s.materials);
+    ASSERT_TRUE(built.has_value());
+    ASSERT_EQ(built->size(), 3 * count + 1);
+    std::size_t next = std::min<std::size_t>(count, physics::kWaterSlots);
+    for (std::size_t m = 0; m < count; ++m) {
+      const bool own = m < physics::kWaterSlots;
+      EXPECT_EQ((*built)[m].water_shared, !own);
+      EXPECT_EQ((*built)[m].water_slot, own ? m : physics::kWaterSlots - 1) << "nearest capacity";
+      for (std::size_t twin = (*built)[m].first_twin; twin < (*built)[m].first_twin + 2; ++twin) {
+        const bool left = next < physics::kWaterSlots;
+        EXPECT_EQ((*built)[twin].water_shared, !left);
+        EXPECT_EQ((*built)[twin].water_slot,
+                  left ? static_cast<int>(next++) : (*built)[m].water_slot);
+      }
+    }
+    // The surroundings are a material of the scene and take no slot of their own.
+    EXPECT_EQ(built->back().water_slot, 0);
+    EXPECT_FALSE(built->back().water_shared);
+    const std::string warning = shared_water_warning(s, s.materials, *built);
+    const auto names = [&](const std::string& text) {
+      return warning.find(text) != std::string::npos;
+    };
+    EXPECT_EQ(warning.empty(), count == 2) << warning;
+    EXPECT_EQ(names("s.toml: more materials hold rain water than the 8"), count > 2) << warning;
+    EXPECT_EQ(names("'road 8' dries as another material does"), count == 9) << warning;
+    EXPECT_FALSE(names("'road 7' dries as another")) << warning;
+    EXPECT_FALSE(names("surroundings")) << warning;
+    EXPECT_EQ(names("the clutter of 'road 1' dries as its mean does"), count == 9) << warning;
+    EXPECT_EQ(names("the clutter of 'road 3' dries as its mean does"), count > 2) << warning;
+    // Nobody is told about rain where none is known.
+    for (scene::WeatherSample& row : s.weather) row.rain_mm_h = 0.0;
+    EXPECT_EQ(shared_water_warning(s, s.materials, *built), "");
+    // Every material has the ground of its slot in a history.
+    const Environment environment(s);
+    EXPECT_TRUE(make_foster(s, *built, environment, kReferenceK).has_value());
+  }
+}
+
+TEST(FosterMaterials, TwinsWithTheGroundOfTheirMeanCostAccuracy) {
+  // This is why twins have grounds of their own while there are slots.
+  for (const std::int64_t rain_h : {-6, 0, 5}) {
+    scene::ScenarioDesc s = shower(rain_h);
+    s.materials[1].water_store_mm = 0.48;
+    s.materials[1].clutter = clutter();
+    const std::vector one{s.materials[1]};
+    auto built = build_foster_materials(s, one);
+    ASSERT_TRUE(built.has_value());
+    const Environment environment(s);
+    auto history = make_foster(s, *built, environment, kReferenceK);
+    ASSERT_TRUE(history.has_value());
+    StepPlan plan(s.thermal);
+    std::int64_t at_ns = (rain_h - 1) * 3600 * kSecondNs;
+    plan.update(at_ns, environment, {});
+    history->update(plan, environment);
+    double worst_k = 0.0;
+    std::array<std::array<physics::FosterState<double>, 2>, 2> states{};
+    for (std::size_t side = 0; side < 2; ++side) {
+      states[side].fill(history->spun_up(1 + side, {0.0, 0.0, 1.0}));
+    }
+    for (int step = 0; step < 12 * 10; ++step) {
+      const IntervalForcing forcing = history->extend(at_ns, at_ns + 300 * kSecondNs, environment);
+      at_ns += 300 * kSecondNs;
+      for (std::size_t side = 0; side < 2; ++side) {
+        double k[2];
+        for (std::size_t shares = 0; shares < 2; ++shares) {
+          FosterMaterial twin = (*built)[1 + side];
+          if (shares == 1) twin.water_slot = (*built)[0].water_slot;
+          const auto surface =
+              physics::foster_surface(twin.network, twin.emissivity_frac, twin.base_k, kReferenceK);
+          physics::FosterState<double>& x = states[side][shares];
+          const double offset_k = physics::foster_offset_k(x, surface);
+          const auto drive = [&](const SurfaceForcing& f) {
+            return unshadowed_drive(f, twin, {0.0, 0.0, 1.0}, kReferenceK, offset_k);
+          };
+          physics::foster_advance(x, drive(forcing.begin), drive(forcing.end),
+                                  physics::foster_ladder(forcing.dt_s, twin.network), surface,
+                                  0.01);
+          k[shares] = physics::foster_offset_k(x, surface);
+        }
+        worst_k = std::max(worst_k, std::abs(k[1] - k[0]));
+      }
+    }
+    std::printf("rain at %+d h: twins that share the ground of their mean are off by %.2f K\n",
+                static_cast<int>(rain_h), worst_k);
+    EXPECT_GT(worst_k, 0.1);
+  }
 }
 
 TEST(FosterMaterials, TakeFittedModesUnlessAnotherNumberIsAskedFor) {

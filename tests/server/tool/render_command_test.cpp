@@ -285,6 +285,52 @@ TEST(CliRender, a_view_of_nothing_warns) {
   EXPECT_NE(result.err.find("nothing but sky"), std::string::npos) << result.err;
 }
 
+TEST(CliRender, dry_surfaces_after_rain_are_put_down_to_what_they_are_due_to) {
+  const TemporaryFolder folder;
+  write_text(folder.file("w.csv"),
+             "time_s,dni_w_m2,dhi_w_m2,longwave_down_w_m2,air_k,wind_m_s,rain_mm_h\n"
+             "-200000,0,100,330,290,2,0\n0,0,100,330,290,2,0\n"
+             "3600,0,100,330,290,2,4\n20000,0,100,330,290,2,0\n");
+  write_text(folder.file("s.toml"), R"(
+    epoch_utc = 2014-06-21T06:00:00Z
+    [weather]
+    file = "w.csv"
+    [thermal]
+    history_start_s = 0.0
+    steps = 5
+    [sensor]
+    width_px = 160
+    height_px = 120
+    [[sensor.trajectory]]
+    time_s = 7200.0
+    position_m = [-6.4, -3.6, 5.0]
+    look_at_m = [-0.6, 0.3, 0.4]
+    [[object]]
+    gltf = "share:scenes/box.glb"
+    material = "painted_metal"
+  )");
+  const auto warnings = [&](const std::string& model) {
+    const ProcessResult result =
+        run_emit({"render", folder.file("s.toml"), "--time-s", "7200", "--out",
+                  folder.file("a.exr"), "--set", "thermal.model=" + model});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return result.err;
+  };
+  const auto count = [](const std::string& text, const std::string& part) {
+    std::size_t found = 0;
+    for (auto at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++found;
+    return found;
+  };
+  // The scene and the frame have a warning each.
+  const std::string published = warnings("emit2014");
+  EXPECT_EQ(count(published, "thermal.model \"emit2014\" has no rain"), 2U) << published;
+  EXPECT_EQ(count(published, "store"), 0U) << published;
+  const std::string extended = warnings("foster");
+  EXPECT_EQ(count(extended, "emit2014"), 0U) << extended;
+  EXPECT_EQ(count(extended, "'painted_metal' states no 'water_store_mm'"), 1U) << extended;
+  EXPECT_EQ(count(extended, "because they state no store of water"), 1U) << extended;
+}
+
 TEST(CliRender, an_unknown_band_exits_with_2_and_lists_the_bands) {
   const TemporaryFolder folder;
   const ProcessResult result = run_emit(render(folder.file("a.exr"), {"--band", "ultraviolet"}));

@@ -62,6 +62,7 @@ struct FosterMaterial {
   physics::MoistSurface moisture;  ///< exchange of water with the air
   physics::WaterStore store;       ///< room for rain water
   int water_slot = -1;             ///< of SurfaceForcing::wet_frac; -1: it holds no water
+  bool water_shared = false;       ///< too few slots: the ground of its slot is that of another one
   bool sheet = false;              ///< driven by the mean of the fluxes that its two faces receive
   bool body = false;               ///< the base is the interior of a body, which starts at base_k
   /// Layers in which heat moves sideways; empty for sheets and for prescribed temperatures.

@@ -17,7 +17,8 @@ struct WaterCourse {
   std::vector<double> water_mm;
   std::vector<double> wet_frac;  ///< share of what ground as warm and wet all over would give
   std::vector<double> face_k;    ///< temperature of the ground
-  double lost_mm = 0.0;          ///< evaporated and drained in all
+  double evaporated_mm = 0.0;    ///< in all, less the dew
+  double drained_mm = 0.0;       ///< in all: what the store could not take
 
   [[nodiscard]] bool empty() const noexcept { return time_ns.empty(); }
   /// Returns the wetness at an instant: linear between nodes, 0 for an empty course.

@@ -52,8 +52,8 @@ inline constexpr double kRainTiltCosine = 0.17;
   return up > kRainTiltCosine ? level_frac : 0.0;
 }
 
-/// Number of materials of a scene whose water is followed. Further ones share that of the material
-/// whose store is most alike.
+/// Number of grounds of a scene whose water is followed. Further materials share that of the
+/// material whose store is most alike, further twins of clutter that of their mean.
 inline constexpr std::size_t kWaterSlots = 8;
 
 }  // namespace emit::physics
