@@ -20,7 +20,7 @@ checkers=(clang-format clang-tidy clang libclang-rt-dev python3 tshark chromium 
 yardsticks=(iperf3 libzmq3-dev iceoryx libiceoryx-posh-dev)
 docs=(python3 mkdocs mkdocs-material)
 peers=(gpsd-tools proj-bin ffmpeg gdal-bin)
-node_peers=(@mcap/core@2 @mcap/support@1 protobufjs@7 open-dis@1 gps@0.9)
+node_peers=(@mcap/core@2 @mcap/support@1 @foxglove/schemas@2 protobufjs@7 open-dis@1 gps@0.9)
 peers_folder=${EMIT_PEERS_DIR:-${XDG_CACHE_HOME:-$HOME/.cache}/emit/peers}
 
 with_peers=false

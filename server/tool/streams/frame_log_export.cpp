@@ -15,6 +15,7 @@
 #include "emit/v1/control.pb.h"
 #include "emit/v1/frame.pb.h"
 #include "tool/support/frame_files.hpp"
+#include "tool/support/recorded_frame.hpp"
 
 namespace emit::tool {
 namespace {
@@ -77,7 +78,6 @@ Result<void> write_image(const std::filesystem::path& folder, const v1::Recorded
                          std::span<const float> pixels) {
   const auto header = protocol::decode_frame_header(std::as_bytes(std::span(frame.header())));
   if (!header) return tl::unexpected(header.error());
-  const v1::ChannelInfo& channel = frame.channel();
   FramePlanes planes;
   planes.width_px = frame.width_px();
   planes.height_px = frame.height_px();
@@ -89,14 +89,7 @@ Result<void> write_image(const std::filesystem::path& folder, const v1::Recorded
   planes.applied_shift_y_px = header->applied_shift_y_px;
   planes.sensor_width_px = header->sensor_width_px;
   planes.sensor_height_px = header->sensor_height_px;
-  std::vector<physics::ResponsePoint> response;
-  const int samples = std::min(channel.response_um_size(), channel.response_frac_size());
-  for (int i = 0; i < samples; ++i) {
-    response.push_back({channel.response_um(i), channel.response_frac(i)});
-  }
-  planes.metadata = {frame.sim_time_ns(),  frame.frame_number(), header->pose, channel.band(),
-                     channel.band_lo_um(), channel.band_hi_um(), frame.unit(), response,
-                     header->fov_h_rad};
+  planes.metadata = metadata_of(frame, *header);
   return write_frame_exr(folder / fmt::format("frame_{:06}.exr", frame.frame_number()), planes);
 }
 
