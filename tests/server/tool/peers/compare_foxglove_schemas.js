@@ -20,9 +20,14 @@ function publishedType(name) {
   return protobuf.parse(text, { keepCase: true }).root.lookupType(`foxglove.${name}`);
 }
 
-const short = (type) => type.replace(/^\.?(foxglove\.)?/, "");
-const label = (field) =>
-  field.repeated ? "repeated" : field.options?.proto3_optional ? "optional" : "single";
+/// A type within a message is named in full by the one and in short by the other.
+const short = (type) => type.slice(type.lastIndexOf(".") + 1);
+/// A descriptor says "optional" by an enclosing oneof of one field.
+const label = (field) => {
+  if (field.repeated) return "repeated";
+  const alone = field.partOf?.name === `_${field.name}`;
+  return alone || field.options?.proto3_optional ? "optional" : "single";
+};
 const lines = (type) => [
   ...type.fieldsArray.map((f) => `${f.id} ${label(f)} ${short(f.type)} ${f.name}`).sort(),
   ...type.nestedArray
@@ -44,6 +49,7 @@ function compare(root, name) {
   fieldCount += ours.fieldsArray.length;
   for (const field of ours.fieldsArray) {
     const inner = short(field.type);
+    if (field.type.includes("google.protobuf.")) continue;
     if (published.foxgloveMessageSchemas[inner] !== undefined) compare(root, inner);
   }
 }
