@@ -19,11 +19,13 @@ def start(pacing, address="127.0.0.1:0", more=""):
 
 
 @contextlib.contextmanager
-def swinging_axes(seconds, amplitude_rad=0.1, rate_rad_s=2.0):
-    """A daemon with a motion simulator of three axes, and a host whose seeker swings about north in heading."""
+def swinging_axes(seconds, amplitude_rad, rate_rad_s, delay_s):
+    """A daemon with a motion simulator of three axes that follow without error but `delay_s` late, and a host whose
+    seeker swings about north in heading."""
     with contextlib.ExitStack() as stack:
         folder = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        table = subprocess.Popen([BIN_DIR / "emit", "fms-sim", "--listen", "127.0.0.1:0", "--axes", "3"],
+        table = subprocess.Popen([BIN_DIR / "emit", "fms-sim", "--listen", "127.0.0.1:0", "--axes", "3",
+                              "--delay-ms", str(1000 * delay_s), "--noise-arcsec", "0"],
                                  stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         stack.callback(lambda: (table.send_signal(signal.SIGINT), table.wait(30), table.stdout.close()))
         controller = table.stdout.readline().split("axes_udp=")[1].strip()

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
@@ -65,6 +66,10 @@ std::string numbers_of(const std::string& text) {
 
 TEST(CampaignSlurm, a_killed_and_a_failing_element_are_resumed_and_give_the_numbers_of_a_local_run) {
   const ScratchFolder folder;
+  // munge wants its socket to be in reach of all users.
+  std::filesystem::permissions(
+      folder.path(), std::filesystem::perms::group_exec | std::filesystem::perms::others_exec,
+      std::filesystem::perm_options::add);
   const SlurmNode node(folder.file("node"));
   if (!node.installed) GTEST_SKIP() << node.said << "Debian: slurmctld slurmd slurm-client munge";
   ASSERT_NE(node.conf, "") << node.said;
