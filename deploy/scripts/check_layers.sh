@@ -77,7 +77,7 @@ server/tool/support: server/app server/pacing server/telemetry config/include pr
 server/tool/command_line: server/tool/support config/include renderer/physics
 server/tool/logger: server/tool/command_line server/tool/support config/include renderer/physics renderer/reference renderer/scene
 server/tool/streams: server/tool/command_line server/tool/support server/app server/client server/rt protocol renderer/image renderer/physics renderer/scene
-server/tool/foxglove: server/tool/support protocol renderer/image renderer/physics
+server/tool/foxglove: server/tool/command_line server/tool/streams server/tool/support protocol renderer/image renderer/physics
 server/tool/view: server/tool/support server/tool/streams server/client renderer/image renderer/include renderer/physics
 server/tool/report: server/tool/support renderer/physics
 server/tool/engage: server/tool/command_line server/tool/report server/tool/support server/tool/streams server/client server/engage config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
@@ -146,6 +146,8 @@ arrows=$(includes | awk -F: -v layers="$layers" '
     if (match(header, /^emit\/[a-z]+\//)) {
       split(header, word, "/")
       to = owner[word[2]]
+    } else if (header ~ /^foxglove\//) {
+      to = "server/tool/foxglove"  # generated from its own .proto files
     } else if (header ~ /^\.\.\// || header !~ /\//) {
       to = from
     } else if (from ~ /^(config|renderer\/reference|renderer\/scene|renderer\/verify)\/src/) {

@@ -31,9 +31,9 @@ struct AxesBoard {
 
 /// Measurement of the axes with what was commanded for its instant, for the strips of the console.
 struct AxesTick {
-  std::int64_t time_ns = 0;      ///< instant of the measurement, wall
-  std::uint8_t count = 0;        ///< axes that are measured
-  bool driven = false;           ///< emitd commanded them to follow; else demanded_rad is not valid
+  std::int64_t time_ns = 0;  ///< instant of the measurement, wall
+  std::uint8_t count = 0;    ///< axes that are measured
+  bool driven = false;       ///< emitd commanded them to follow; else demanded_rad is not valid
   std::array<double, protocol::kMaxAxes> measured_rad{};
   std::array<double, protocol::kMaxAxes> demanded_rad{};
 };

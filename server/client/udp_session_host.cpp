@@ -32,8 +32,8 @@ constexpr std::size_t kMaxStatuses = 256;
 physics::Result<void> draw(std::uint64_t& out) {
   // The kernel never returns fewer bytes for so short a request.
   if (::getrandom(&out, sizeof out, 0) == static_cast<ssize_t>(sizeof out)) return {};
-  return make_error(ErrorCode::io, fmt::format("no random number for the session: {}",
-                                               server::error_text(errno)));
+  return make_error(ErrorCode::io,
+                    fmt::format("no random number for the session: {}", server::error_text(errno)));
 }
 
 class SessionHost final : public HostClient {

@@ -167,8 +167,7 @@ void add_axes(std::string& text, Context& context) {
   text += ",\"ticks\":[";
   while (const AxesTick* tick = context.axes_ticks.front()) {
     if (text.back() != '[') text += ',';
-    fmt::format_to(Out(text), "[{:.2f},",
-                   us_between(tick->time_ns, context.clock.tai_ns()) / 1e3);
+    fmt::format_to(Out(text), "[{:.2f},", us_between(tick->time_ns, context.clock.tai_ns()) / 1e3);
     const auto degrees = [&](double angle_rad) {
       fmt::format_to(Out(text), "{:.7f}", angle_rad / physics::kDegree);
     };

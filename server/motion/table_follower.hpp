@@ -83,8 +83,8 @@ class TableFollower {
   /// Returns the largest difference between the latest measurement and what was commanded for its
   /// instant, rad. It is 0 unless the axes follow.
   [[nodiscard]] double error_rad() const noexcept { return error_rad_; }
-  /// Returns what was commanded for the instant of the latest measurement, rad, by axis. It is empty
-  /// unless the latest command was to follow.
+  /// Returns what was commanded for the instant of the latest measurement, rad, by axis. It is
+  /// empty unless the latest command was to follow.
   [[nodiscard]] std::span<const double> asked_rad() const noexcept {
     return std::span(asked_rad_).first(driving_ ? monitor_.count : 0);
   }

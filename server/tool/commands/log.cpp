@@ -11,6 +11,7 @@
 #include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
 #include "tool/commands/log_commands.hpp"
+#include "tool/foxglove/foxglove_command.hpp"
 #include "tool/streams/frame_log_export.hpp"
 #include "tool/streams/pose_log.hpp"
 #include "tool/support/console.hpp"

@@ -6,7 +6,5 @@
 namespace emit::tool {
 
 void add_log_info(CommandLine& log);
-/// @param exports  group of `emit log export`
-void add_log_export_foxglove(CommandLine& exports);
 
 }  // namespace emit::tool

@@ -22,8 +22,8 @@
 #include "emit/v1/control.pb.h"
 #include "emit/v1/frame.pb.h"
 #include "tool/foxglove/recorded_place.hpp"
+#include "tool/streams/frame_log_export.hpp"
 #include "tool/support/frame_files.hpp"
-#include "tool/support/recorded_frame.hpp"
 
 namespace emit::tool {
 namespace {
@@ -40,7 +40,7 @@ constexpr const char* kEventTopic = "/events";
 constexpr const char* kFrameTopic = "/frames";
 constexpr const char* kSeekerFrame = "seeker";
 
-/// What is exported: a run and a range of its simulation time.
+/// Run that is exported, and the range of its simulation time.
 struct Chosen {
   bool journal = false;
   std::uint64_t run_id = 0;
@@ -85,7 +85,7 @@ Result<Chosen> choose(const fs::path& file, const FoxgloveOptions& options) {
   return out;
 }
 
-/// How the images of a channel are shown.
+/// Names and colours with which the images of a channel are shown.
 struct ChannelLook {
   std::string topic;  ///< name in front of those of its topics
   std::string frame;  ///< frame of reference, as sensors have it
@@ -110,8 +110,7 @@ class ImageCursor {
       if (!more || !*more) return more;
       if (log_.frame().run_id() != chosen_->run_id) continue;
       if (!chosen_->holds(log_.frame().sim_time_ns())) continue;
-      auto header =
-          protocol::decode_frame_header(std::as_bytes(std::span(log_.frame().header())));
+      auto header = protocol::decode_frame_header(std::as_bytes(std::span(log_.frame().header())));
       if (!header) return tl::unexpected(header.error());
       header_ = *header;
       return true;
@@ -160,7 +159,7 @@ Result<Looks> survey(const fs::path& file, const Chosen& chosen) {
       look = looks.emplace(channel.index(), ChannelLook{}).first;
       look->second.topic = "/camera/" + channel.name();
       look->second.unit = images->frame().unit();
-      const auto band = spectral_band(metadata_of(images->frame(), images->header()));
+      const auto band = spectral_band(recorded_metadata(images->frame(), images->header()));
       if (band && images->header().quantity == protocol::PixelQuantity::radiance_w_m2_sr) {
         look->second.apparent.emplace(*band);
         look->second.unit = "K";
@@ -194,10 +193,10 @@ std::optional<PinholeCamera> camera_of(const protocol::FrameHeader& header) {
   if ((header.output_steps & protocol::kOutputMoved) != 0 || !(header.fov_h_rad > 0.0F)) {
     return std::nullopt;
   }
-  const double sensor_width_px = header.sensor_width_px > 0 ? header.sensor_width_px
-                                                            : header.width_px;
-  const double sensor_height_px = header.sensor_height_px > 0 ? header.sensor_height_px
-                                                              : header.height_px;
+  const double sensor_width_px =
+      header.sensor_width_px > 0 ? header.sensor_width_px : header.width_px;
+  const double sensor_height_px =
+      header.sensor_height_px > 0 ? header.sensor_height_px : header.height_px;
   PinholeCamera out;
   out.width_px = header.width_px;
   out.height_px = header.height_px;
@@ -239,8 +238,9 @@ std::string command_text(v1::Command::Kind kind) {
 /// Writes the messages of the chosen run.
 class Exporter {
  public:
-  Exporter(FoxgloveFile& file, const Chosen& chosen, const Looks& looks, const FoxgloveImages& which,
-           std::int64_t epoch_ns, const std::optional<physics::GeoPlace>& origin)
+  Exporter(FoxgloveFile& file, const Chosen& chosen, const Looks& looks,
+           const FoxgloveImages& which, std::int64_t epoch_ns,
+           const std::optional<physics::GeoPlace>& origin)
       : file_(file), chosen_(chosen), looks_(looks), which_(which), epoch_ns_(epoch_ns) {
     if (origin) {
       ecef_from_world_ = physics::ecef_from_enu(*origin);
@@ -259,8 +259,8 @@ class Exporter {
     if (done && ecef_from_world_) {
       const glm::dvec3 at_ecef_m =
           origin_ecef_m_ + *ecef_from_world_ * frame.seeker.position_world_m;
-      done = file_.location(kLocationTopic, **stamp, kSeekerFrame,
-                            physics::place_at_ecef(at_ecef_m));
+      done =
+          file_.location(kLocationTopic, **stamp, kSeekerFrame, physics::place_at_ecef(at_ecef_m));
     }
     if (!done || chosen_.journal) return done;
     for (const protocol::EntityStateData& state : frame.entity_span()) {
@@ -308,8 +308,8 @@ class Exporter {
       ++without_camera_;
     }
     if (done && which_.values) {
-      done = file_.image(look.topic + "/image", **stamp, look.frame, frame.width_px(),
-                         image.pixels());
+      done =
+          file_.image(look.topic + "/image", **stamp, look.frame, frame.width_px(), image.pixels());
     }
     if (!done || !which_.preview || !look.limits) return done;
     image::FalseColorOptions colors;
@@ -342,10 +342,11 @@ class Exporter {
     }
     const std::int64_t stamp_ns = epoch_ns_ + sim_time_ns;
     if (stamp_ns < 0) {
-      return make_error(ErrorCode::invalid_argument,
-                        fmt::format("simulation time {:.9f} s is before 1970, for which MCAP has no "
-                                    "time: --from-s leaves it out",
-                                    1e-9 * static_cast<double>(sim_time_ns)));
+      return make_error(
+          ErrorCode::invalid_argument,
+          fmt::format("simulation time {:.9f} s is before 1970, for which MCAP has no "
+                      "time: --from-s leaves it out",
+                      1e-9 * static_cast<double>(sim_time_ns)));
     }
     last_stamp_ns_ = std::max(last_stamp_ns_.value_or(stamp_ns), stamp_ns);
     if (auto done = flush(stamp_ns); !done) return tl::unexpected(done.error());
@@ -374,9 +375,9 @@ class Exporter {
   Result<void> frame(const v1::FrameDecision& decision) {
     if (chosen_.holds(decision.sim_time_ns()) && decision.flags() != flags_) {
       flags_ = decision.flags();
-      waiting_.emplace_back(flags_ == 0 ? EventLevel::info : EventLevel::warning,
-                            fmt::format("frame {} and following: {}", decision.frame_number(),
-                                        flag_text(flags_)));
+      waiting_.emplace_back(
+          flags_ == 0 ? EventLevel::info : EventLevel::warning,
+          fmt::format("frame {} and following: {}", decision.frame_number(), flag_text(flags_)));
     }
     auto stamp = reach(decision.sim_time_ns());
     if (!stamp) return tl::unexpected(stamp.error());
@@ -400,8 +401,7 @@ class Exporter {
     const auto [known, is_new] = shown_.try_emplace(id, true);
     if (known->second != on) {
       known->second = on;
-      waiting_.emplace_back(EventLevel::info,
-                            fmt::format("entity {}: {}", id, on ? "on" : "off"));
+      waiting_.emplace_back(EventLevel::info, fmt::format("entity {}: {}", id, on ? "on" : "off"));
       if (auto done = flush(stamp_ns); !done) return done;
     }
     if (pose == nullptr) return {};
@@ -419,9 +419,9 @@ class Exporter {
   Result<void> describe(std::int64_t stamp_ns, const v1::RecordedFrame& frame,
                         const ChannelLook& look) {
     if (!described_.insert(frame.channel().index()).second) return {};
-    std::string text = fmt::format("{}: channel {}, {} x {} px in {}", look.topic,
-                                   frame.channel().name(), frame.width_px(), frame.height_px(),
-                                   frame.unit());
+    std::string text =
+        fmt::format("{}: channel {}, {} x {} px in {}", look.topic, frame.channel().name(),
+                    frame.width_px(), frame.height_px(), frame.unit());
     if (frame.channel().band_hi_um() > 0.0) {
       text += fmt::format(", band {} from {:g} to {:g} um", frame.channel().band(),
                           frame.channel().band_lo_um(), frame.channel().band_hi_um());
@@ -510,8 +510,8 @@ Result<void> run(const fs::path& file, const Chosen& chosen, bool with_images, E
   while (more_entries && more_images && (*more_entries || *more_images)) {
     const bool take_image =
         *more_images &&
-        (!*more_entries || (entries->sim_time_ns() &&
-                            images->frame().sim_time_ns() < *entries->sim_time_ns()));
+        (!*more_entries ||
+         (entries->sim_time_ns() && images->frame().sim_time_ns() < *entries->sim_time_ns()));
     if (take_image) {
       if (auto done = exporter.image(*images); !done) return done;
       ++shown;
@@ -542,8 +542,8 @@ Result<FoxgloveSummary> export_foxglove(const fs::path& log, const fs::path& out
   if (!chosen) return tl::unexpected(chosen.error());
   summary.run_id = chosen->run_id;
   if (chosen->truncation) summary.notes.push_back(*chosen->truncation);
-  const RecordedPlace place = chosen->recording ? recorded_place(*chosen->recording)
-                                                : RecordedPlace{};
+  const RecordedPlace place =
+      chosen->recording ? recorded_place(*chosen->recording) : RecordedPlace{};
   if (!place.epoch_utc_ns) {
     summary.notes.emplace_back(
         "the log does not hold the scenario's epoch: stamps count from 1970-01-01");

@@ -87,7 +87,8 @@ struct FoxgloveFile::Impl {
     }
     auto channel = mcap.add_channel(schema->second, name, "protobuf");
     if (!channel) return tl::unexpected(channel.error());
-    return &topics.emplace(std::string(name), Topic{*channel, message.full_name(), 0}).first->second;
+    return &topics.emplace(std::string(name), Topic{*channel, message.full_name(), 0})
+                .first->second;
   }
 
   Result<void> write(std::string_view name, std::int64_t stamp_ns,
@@ -154,16 +155,15 @@ Result<void> FoxgloveFile::image(std::string_view topic, std::int64_t stamp_ns,
   EMIT_CHECK_OP(width_px, >, 0U);
   EMIT_CHECK_OP(values.size() % width_px, ==, 0U);
   const auto height_px = static_cast<std::uint32_t>(values.size() / width_px);
-  foxglove::RawImage out =
-      raw_image(stamp_ns, frame, width_px, height_px, "32FC1", sizeof(float));
+  foxglove::RawImage out = raw_image(stamp_ns, frame, width_px, height_px, "32FC1", sizeof(float));
   out.set_data(values.data(), values.size_bytes());
   return impl_->write(topic, stamp_ns, out);
 }
 
 Result<void> FoxgloveFile::image(std::string_view topic, std::int64_t stamp_ns,
                                  std::string_view frame, const image::RgbImage& picture) {
-  foxglove::RawImage out = raw_image(stamp_ns, frame, picture.width_px, picture.height_px, "rgb8",
-                                     sizeof(image::Rgb));
+  foxglove::RawImage out =
+      raw_image(stamp_ns, frame, picture.width_px, picture.height_px, "rgb8", sizeof(image::Rgb));
   out.set_data(picture.rgb.data(), picture.rgb.size());
   return impl_->write(topic, stamp_ns, out);
 }

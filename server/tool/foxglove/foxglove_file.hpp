@@ -20,7 +20,7 @@ class FrameDecision;
 
 namespace emit::tool {
 
-/// How much an entry of the log panel matters.
+/// Severity of an entry of the log panel.
 enum class EventLevel : std::uint8_t { info, warning, error };
 
 /// Topic of a file, its message type and the number of its messages.
@@ -34,8 +34,8 @@ struct FoxgloveTopic {
 struct PinholeCamera {
   std::uint32_t width_px = 0;
   std::uint32_t height_px = 0;
-  double focal_px = 0.0;               ///< positive
-  std::array<double, 2> centre_px{};   ///< where the axis meets the image, right and down
+  double focal_px = 0.0;              ///< positive
+  std::array<double, 2> centre_px{};  ///< where the axis meets the image, right and down
 };
 
 /// Writes an MCAP file of messages that Foxglove and other viewers know by name. Topics appear with

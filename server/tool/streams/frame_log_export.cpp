@@ -15,7 +15,6 @@
 #include "emit/v1/control.pb.h"
 #include "emit/v1/frame.pb.h"
 #include "tool/support/frame_files.hpp"
-#include "tool/support/recorded_frame.hpp"
 
 namespace emit::tool {
 namespace {
@@ -89,11 +88,24 @@ Result<void> write_image(const std::filesystem::path& folder, const v1::Recorded
   planes.applied_shift_y_px = header->applied_shift_y_px;
   planes.sensor_width_px = header->sensor_width_px;
   planes.sensor_height_px = header->sensor_height_px;
-  planes.metadata = metadata_of(frame, *header);
+  planes.metadata = recorded_metadata(frame, *header);
   return write_frame_exr(folder / fmt::format("frame_{:06}.exr", frame.frame_number()), planes);
 }
 
 }  // namespace
+
+image::FrameMetadata recorded_metadata(const v1::RecordedFrame& frame,
+                                       const protocol::FrameHeader& header) {
+  const v1::ChannelInfo& channel = frame.channel();
+  std::vector<physics::ResponsePoint> response;
+  const int samples = std::min(channel.response_um_size(), channel.response_frac_size());
+  for (int i = 0; i < samples; ++i) {
+    response.push_back({channel.response_um(i), channel.response_frac(i)});
+  }
+  return {frame.sim_time_ns(),  frame.frame_number(), header.pose,  channel.band(),
+          channel.band_lo_um(), channel.band_hi_um(), frame.unit(), response,
+          header.fov_h_rad};
+}
 
 Result<FrameExportSummary> export_log_frames(const std::filesystem::path& file,
                                              const std::filesystem::path& folder,

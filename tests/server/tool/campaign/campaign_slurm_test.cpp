@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A campaign on a cluster of one node that the test starts itself: an element that is killed, one that
-// fails, the resumption, and the numbers of a local run.
+// A campaign on a cluster of one node that the test starts itself: an element that is killed, one
+// that fails, the resumption, and the numbers of a local run.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -64,7 +64,8 @@ std::string numbers_of(const std::string& text) {
   return out;
 }
 
-TEST(CampaignSlurm, a_killed_and_a_failing_element_are_resumed_and_give_the_numbers_of_a_local_run) {
+TEST(CampaignSlurm,
+     a_killed_and_a_failing_element_are_resumed_and_give_the_numbers_of_a_local_run) {
   const ScratchFolder folder;
   // munge wants its socket to be in reach of all users.
   std::filesystem::permissions(
@@ -80,16 +81,18 @@ TEST(CampaignSlurm, a_killed_and_a_failing_element_are_resumed_and_give_the_numb
     rows += fmt::format("[{}.0, \"{}\"], ", i + 1,
                         folder.file(i + 1 < kElements ? "box.glb" : "lost.glb"));
   }
-  const std::string campaign = folder.write(
-      "c.toml", "scenario = \"box\"\ntimes = \"10:30\"\n"
-                "set = [\"sensor.width_px=64\", \"sensor.height_px=48\", \"thermal.steps=5\"]\n"
-                "[[vary]]\nkeys = [\"weather.wind_m_s\", \"object[0].gltf\"]\nvalues = [" +
-                    rows +
-                    "]\n[truth]\nkind = \"none\"\n[run]\nretries = 1\n"
-                    "[slurm]\ncpus = 1\nmemory_mib = 1000\n");
+  const std::string campaign =
+      folder.write("c.toml",
+                   "scenario = \"box\"\ntimes = \"10:30\"\n"
+                   "set = [\"sensor.width_px=64\", \"sensor.height_px=48\", \"thermal.steps=5\"]\n"
+                   "[[vary]]\nkeys = [\"weather.wind_m_s\", \"object[0].gltf\"]\nvalues = [" +
+                       rows +
+                       "]\n[truth]\nkind = \"none\"\n[run]\nretries = 1\n"
+                       "[slurm]\ncpus = 1\nmemory_mib = 1000\n");
   const auto elements = folder.path() / "slurm" / "elements";
-  ToolProcess first(folder, "first", {"campaign", campaign, "--out", folder.file("slurm"),
-                                      "--slurm", "--json", folder.file("first.json")});
+  ToolProcess first(folder, "first",
+                    {"campaign", campaign, "--out", folder.file("slurm"), "--slurm", "--json",
+                     folder.file("first.json")});
 
   // Kill the first element that runs.
   std::string task;
@@ -112,13 +115,13 @@ TEST(CampaignSlurm, a_killed_and_a_failing_element_are_resumed_and_give_the_numb
   EXPECT_THAT(first.err(), HasSubstr("lost.glb: cannot be read"));
   EXPECT_THAT(folder.read("slurm/report.html"), HasSubstr("Elements without result"));
 
-  // With the file in its place the same command does what is left.
+  // The same command does what is left when the file is in its place.
   std::filesystem::copy_file(folder.file("box.glb"), folder.file("lost.glb"));
   const ProcessResult second =
       run_emit({"campaign", campaign, "--out", folder.file("slurm"), "--slurm"}, kLimit);
   EXPECT_EQ(second.exit_code, 0) << second.out << second.err;
-  EXPECT_THAT(second.out, HasSubstr(fmt::format("{} done ({} of them before)", kElements,
-                                                kElements - 1)));
+  EXPECT_THAT(second.out,
+              HasSubstr(fmt::format("{} done ({} of them before)", kElements, kElements - 1)));
   const ProcessResult local =
       run_emit({"campaign", campaign, "--out", folder.file("local"), "--jobs", "2"}, kLimit);
   EXPECT_EQ(local.exit_code, 0) << local.out << local.err;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Exports for Foxglove, read by the MCAP library of its authors with the schemas in the file, against
-// the poses that a host sent, the pixels in the log and the place that a pixel shows.
+// Exports for Foxglove, read by the MCAP library of its authors with the schemas in the file,
+// against the poses that a host sent, the pixels in the log and the place that a pixel shows.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -220,9 +220,9 @@ TEST_F(FoxgloveExport, another_program_reads_the_poses_pixels_and_camera_of_a_ru
   const Seen& calibration = seen.at("/camera/calibration").front();
   const physics::Pose camera = pose_at(frames["camera"].front(), 2);
   for (const auto& [x, y] : std::vector<std::pair<int, int>>{{5, 30}, {40, 33}}) {
-    const ProcessResult explained = run_emit(
-        {"explain", folder_.file("world.toml"), "--time-s", "0", "--px", fmt::format("{},{}", x, y),
-         "--json", folder_.file("explain.json")});
+    const ProcessResult explained =
+        run_emit({"explain", folder_.file("world.toml"), "--time-s", "0", "--px",
+                  fmt::format("{},{}", x, y), "--json", folder_.file("explain.json")});
     ASSERT_EQ(explained.exit_code, 0) << explained.err;
     std::string json = folder_.read("explain.json");
     std::erase_if(json, [](char c) { return c == ' ' || c == '\n'; });
@@ -265,9 +265,9 @@ TEST_F(FoxgloveExport, its_schemas_are_those_that_foxglove_publishes) {
   }
   ASSERT_NO_FATAL_FAILURE(record());
   exported(log_);
-  const ProcessResult peer = run_process(
-      {"env", "NODE_PATH=" + modules_, "node",
-       EMIT_TEST_SOURCE_DIR "/server/tool/peers/compare_foxglove_schemas.js", out_});
+  const ProcessResult peer =
+      run_process({"env", "NODE_PATH=" + modules_, "node",
+                   EMIT_TEST_SOURCE_DIR "/server/tool/peers/compare_foxglove_schemas.js", out_});
   EXPECT_EQ(peer.exit_code, 0) << peer.err;
   // Six message types and the five that they are made of.
   EXPECT_THAT(peer.out, HasSubstr("\"messages\":11"));

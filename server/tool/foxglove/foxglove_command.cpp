@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "tool/foxglove/foxglove_command.hpp"
+
 #include <fmt/format.h>
 
 #include "emit/version.hpp"
 #include "tool/command_line/common_options.hpp"
-#include "tool/commands/log_commands.hpp"
 #include "tool/foxglove/foxglove_export.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
