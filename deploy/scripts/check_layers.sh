@@ -77,6 +77,7 @@ server/tool/support: server/app server/pacing server/telemetry config/include pr
 server/tool/command_line: server/tool/support config/include renderer/physics
 server/tool/logger: server/tool/command_line server/tool/support config/include renderer/physics renderer/reference renderer/scene
 server/tool/streams: server/tool/command_line server/tool/support server/app server/client server/rt protocol renderer/image renderer/physics renderer/scene
+server/tool/foxglove: server/tool/command_line server/tool/streams server/tool/support protocol renderer/image renderer/physics
 server/tool/view: server/tool/support server/tool/streams server/client renderer/image renderer/include renderer/physics
 server/tool/report: server/tool/support renderer/physics
 server/tool/engage: server/tool/command_line server/tool/report server/tool/support server/tool/streams server/client server/engage config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
@@ -92,7 +93,7 @@ server/tool/nature: server/tool/command_line server/tool/support config/include 
 server/tool/offline: server/tool/command_line server/tool/report server/tool/support server/tool/truth renderer/include renderer/physics renderer/reference renderer/scene
 server/tool/campaign: server/app server/client server/tool/command_line server/tool/offline server/tool/report server/tool/streams server/tool/support config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
 server/tool/scenes: server/tool/command_line server/tool/offline server/tool/support config/include renderer/image renderer/include renderer/physics renderer/reference renderer/scene renderer/scene/generate
-server/tool/commands: server/tool/doctor server/tool/scenes server/tool/nature server/tool/campaign server/tool/command_line server/tool/offline server/tool/engage server/tool/truth server/tool/support server/tool/streams server/tool/view server/tool/fms_sim server/gnss server/motion server/agents server/agents/render server/app server/client server/net server/rt config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
+server/tool/commands: server/tool/doctor server/tool/foxglove server/tool/scenes server/tool/nature server/tool/campaign server/tool/command_line server/tool/offline server/tool/engage server/tool/truth server/tool/support server/tool/streams server/tool/view server/tool/fms_sim server/gnss server/motion server/agents server/agents/render server/app server/client server/net server/rt config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
 server/tool/lab: server/tool/command_line server/tool/support server/tool/commands server/tool/logger server/bench/accuracy server/bench/frame_time server/bench/nature server/bench/stability server/bench/stream config/include renderer/image renderer/physics renderer/reference renderer/scene renderer/verify
 server/tool: server/tool/commands server/tool/lab server/tool/support
 '
@@ -145,6 +146,8 @@ arrows=$(includes | awk -F: -v layers="$layers" '
     if (match(header, /^emit\/[a-z]+\//)) {
       split(header, word, "/")
       to = owner[word[2]]
+    } else if (header ~ /^foxglove\//) {
+      to = "server/tool/foxglove"  # generated from its own .proto files
     } else if (header ~ /^\.\.\// || header !~ /\//) {
       to = from
     } else if (from ~ /^(config|renderer\/reference|renderer\/scene|renderer\/verify)\/src/) {

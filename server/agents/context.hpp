@@ -127,6 +127,7 @@ struct Context {
   SpscRing<HostInput> gateway_inputs{32};       // gateway -> conductor
   SpscRing<GatewayReport> gateway_reports{64};  // conductor -> gateway
   SpscRing<AxisFeedback> shift_feedback{1024};  // motion -> render, where pictures shift
+  SpscRing<AxesTick> axes_ticks{256};           // motion -> console, while a page is open
   SpscRing<HostInput> console_inputs{8};        // console -> conductor
   SpscRing<StatusReply> console_replies{32};    // conductor -> console
   ByteRing journal;                             // conductor -> recorder

@@ -25,6 +25,19 @@ struct AxesBoard {
   std::atomic<std::size_t> count{0};         ///< axes that are commanded
   std::array<std::atomic<double>, protocol::kMaxAxes> measured_rad{};
   std::array<std::atomic<double>, protocol::kMaxAxes> commanded_rad{};
+  /// Set by the console while a page is open. Without it no AxesTick is noted.
+  std::atomic<bool> watched{false};
 };
+
+/// Measurement of the axes with what was commanded for its instant, for the strips of the console.
+struct AxesTick {
+  std::int64_t time_ns = 0;  ///< instant of the measurement, wall
+  std::uint8_t count = 0;    ///< axes that are measured
+  bool driven = false;       ///< emitd commanded them to follow; else demanded_rad is not valid
+  std::array<double, protocol::kMaxAxes> measured_rad{};
+  std::array<double, protocol::kMaxAxes> demanded_rad{};
+};
+/// Shortest time between two of them, ns.
+inline constexpr std::int64_t kAxesTickNs = 20'000'000;
 
 }  // namespace emit::server

@@ -28,11 +28,12 @@ constexpr std::int64_t kRetryNs = 200'000'000;
 constexpr std::size_t kMaxDatagramBytes = 65'507;
 constexpr std::size_t kMaxStatuses = 256;
 
-std::uint64_t random_number() noexcept {
-  std::uint64_t value = 0;
-  // Never short for so few bytes; 0 would only make the daemon refuse the session.
-  static_cast<void>(::getrandom(&value, sizeof value, 0));
-  return value;
+/// Draws a number that nobody can foresee. Errors: io (the kernel gives none).
+physics::Result<void> draw(std::uint64_t& out) {
+  // The kernel never returns fewer bytes for so short a request.
+  if (::getrandom(&out, sizeof out, 0) == static_cast<ssize_t>(sizeof out)) return {};
+  return make_error(ErrorCode::io,
+                    fmt::format("no random number for the session: {}", server::error_text(errno)));
 }
 
 class SessionHost final : public HostClient {
@@ -45,12 +46,12 @@ class SessionHost final : public HostClient {
         control_(std::move(control)),
         session_mac_(std::move(session_mac)),
         open_mac_(std::move(open_mac)),
-        shared_(protocol::make_shared_key(key, open_mac_)),
-        session_id_(random_number()) {
+        shared_(protocol::make_shared_key(key, open_mac_)) {
     open_mac_.set_key(shared_.open_key);
   }
 
   physics::Result<void> open(std::int64_t end_ns) {
+    if (auto drawn = draw(session_id_); !drawn) return drawn;
     while (!open_) {
       if (auto asked = ask(); !asked) return asked;
       const std::int64_t retry_ns = std::min(asked_ns_ + kRetryNs, end_ns);
@@ -116,7 +117,7 @@ class SessionHost final : public HostClient {
         return tl::unexpected(std::move(received.error()));
       }
     }
-    echo_ = random_number();
+    if (auto drawn = draw(echo_); !drawn) return drawn;
     std::array<std::byte, protocol::kSessionHeaderBytes + protocol::kSessionTagBytes> bytes;
     return transmit(open_mac_.seal({SessionKind::open, shared_.id, session_id_, echo_}, bytes, 0),
                     asked_ns_);
@@ -150,19 +151,19 @@ class SessionHost final : public HostClient {
         return make_error(ErrorCode::io, fmt::format("udp {}: {}", to_string(peer_),
                                                      server::error_text(got.error)));
       }
-      take(std::span(received_).first(got.bytes));
+      if (auto taken = take(std::span(received_).first(got.bytes)); !taken) return taken;
     }
   }
 
-  void take(std::span<const std::byte> datagram) {
+  physics::Result<void> take(std::span<const std::byte> datagram) {
     const auto read = protocol::parse_session_datagram(datagram);
     if (!read || read->header.key_id != shared_.id || read->header.session_id != session_id_) {
-      return;
+      return {};
     }
     if (read->header.kind == SessionKind::challenge) {
       const auto challenge = protocol::parse_challenge(read->payload);
       if (challenge && read->header.counter == echo_ && open_mac_.verify(datagram)) {
-        take_challenge(*challenge);
+        return take_challenge(*challenge);
       }
     } else if (read->header.kind == SessionKind::answer && open_ && session_mac_.verify(datagram) &&
                answers_.accept(read->header.counter)) {
@@ -172,16 +173,20 @@ class SessionHost final : public HostClient {
         statuses_.push_back(to_status(status));
       }
     }
+    return {};
   }
 
-  void take_challenge(const protocol::Challenge& challenge) {
-    if (open_ && (challenge.session_known || challenge.nonce == nonce_)) return;
-    if (open_) session_id_ = random_number();  // a session's counters are never used twice
+  physics::Result<void> take_challenge(const protocol::Challenge& challenge) {
+    if (open_ && (challenge.session_known || challenge.nonce == nonce_)) return {};
+    if (open_) {  // a session's counters are never used twice
+      if (auto drawn = draw(session_id_); !drawn) return drawn;
+    }
     open_ = true;
     nonce_ = challenge.nonce;
     counter_ = 0;
     answers_ = {};
     session_mac_.set_key(protocol::session_key(shared_, session_id_, nonce_, session_mac_));
+    return {};
   }
 
   server::UdpSocket socket_;
@@ -190,7 +195,7 @@ class SessionHost final : public HostClient {
   protocol::SessionMac session_mac_;
   protocol::SessionMac open_mac_;
   protocol::SharedKey shared_;
-  std::uint64_t session_id_;
+  std::uint64_t session_id_ = 0;
   std::uint64_t counter_ = 0;
   std::uint64_t echo_ = 0;
   protocol::SessionNonce nonce_{};

@@ -68,6 +68,7 @@ struct ConsoleServer::Impl {
   void pages_changed() {
     const bool any = !hub.pages.empty();
     tap.open(any);
+    context.axes.watched.store(any, std::memory_order_relaxed);
     if (any) {
       image_tick();
       status_tick();
@@ -215,6 +216,7 @@ ConsoleServer::~ConsoleServer() {
   impl_->io.stop();
   impl_->thread.join();
   impl_->tap.open(false);
+  impl_->context.axes.watched.store(false, std::memory_order_relaxed);
   // Connections end with the context, when the timers have gone.
   impl_->hub.pages_changed = [] {};
 }

@@ -143,7 +143,7 @@ void add_warnings(std::string& text, const Context& context, const StatusBoard& 
   });
 }
 
-void add_axes(std::string& text, const Context& context) {
+void add_axes(std::string& text, Context& context) {
   const AxesBoard& axes = context.axes;
   const std::size_t count = axes.count.load(std::memory_order_relaxed);
   const std::int64_t measured_ns = axes.measured_ns.load(std::memory_order_relaxed);
@@ -164,7 +164,20 @@ void add_axes(std::string& text, const Context& context) {
   };
   add("measured_deg", axes.measured_rad);
   add("commanded_deg", axes.commanded_rad);
-  text += '}';
+  text += ",\"ticks\":[";
+  while (const AxesTick* tick = context.axes_ticks.front()) {
+    if (text.back() != '[') text += ',';
+    fmt::format_to(Out(text), "[{:.2f},", us_between(tick->time_ns, context.clock.tai_ns()) / 1e3);
+    const auto degrees = [&](double angle_rad) {
+      fmt::format_to(Out(text), "{:.7f}", angle_rad / physics::kDegree);
+    };
+    list(text, std::span(tick->measured_rad).first(tick->count), degrees);
+    text += ',';
+    list(text, std::span(tick->demanded_rad).first(tick->driven ? tick->count : 0), degrees);
+    text += ']';
+    context.axes_ticks.pop();
+  }
+  text += "]}";
 }
 
 }  // namespace

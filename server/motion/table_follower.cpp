@@ -136,14 +136,14 @@ std::optional<AxisFeedback> TableFollower::take(const protocol::AxesMonitor& mon
 
 void TableFollower::measure_error(const protocol::AxesMonitor& monitor) noexcept {
   error_rad_ = 0.0;
-  if (status_.state != MotionState::following) return;
   // The latest command reaches back to the measurement, which is hardly older.
   const double back_s = seconds_of(monitor.time_ns - command_.time_ns);
   for (std::size_t i = 0; i < monitor.count; ++i) {
     const AxisMotion& asked = command_.axes[i];
-    const double asked_rad =
+    asked_rad_[i] =
         asked.angle_rad + back_s * (asked.rate_rad_s + 0.5 * back_s * asked.acceleration_rad_s2);
-    error_rad_ = std::max(error_rad_, std::abs(monitor.measured[i].angle_rad - asked_rad));
+    if (status_.state != MotionState::following) continue;
+    error_rad_ = std::max(error_rad_, std::abs(monitor.measured[i].angle_rad - asked_rad_[i]));
   }
 }
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "emit/physics/error.hpp"
@@ -82,6 +83,11 @@ class TableFollower {
   /// Returns the largest difference between the latest measurement and what was commanded for its
   /// instant, rad. It is 0 unless the axes follow.
   [[nodiscard]] double error_rad() const noexcept { return error_rad_; }
+  /// Returns what was commanded for the instant of the latest measurement, rad, by axis. It is
+  /// empty unless the latest command was to follow.
+  [[nodiscard]] std::span<const double> asked_rad() const noexcept {
+    return std::span(asked_rad_).first(driving_ ? monitor_.count : 0);
+  }
 
  private:
   static constexpr std::size_t kMaxAxes = protocol::kMaxAxes;
@@ -134,6 +140,7 @@ class TableFollower {
   bool driving_ = false;  ///< the latest command was to follow
   protocol::AxesCommand command_;
   Status status_;
+  std::array<double, kMaxAxes> asked_rad_{};
   double error_rad_ = 0.0;
 };
 

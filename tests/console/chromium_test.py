@@ -13,12 +13,15 @@ import browser  # noqa: E402: the modules that the test needs are there only now
 if browser.program() is None:
     skip.skip("Chromium is not installed; Debian's package is chromium")
 
+import math  # noqa: E402
+import os  # noqa: E402
 import struct  # noqa: E402
 import time  # noqa: E402
 import unittest  # noqa: E402
 
 import numpy as np  # noqa: E402
-from console_daemon import HEIGHT_PX, IG_CLOCK, STEP_NS, WIDTH_PX, address_of, start  # noqa: E402
+from console_daemon import (  # noqa: E402
+    HEIGHT_PX, IG_CLOCK, STEP_NS, WIDTH_PX, address_of, start, swinging_axes)
 from emit_client import FrameClient, HostClient, Pose  # noqa: E402
 
 PATIENCE_S = 120.0
@@ -112,6 +115,54 @@ class Console(unittest.TestCase):
             self.page.wait_for(f"emitConsole.image.frame.run_id === emitConsole.runId && {SHOWN} > 20", PATIENCE_S)
             self.assertEqual(self.page.evaluate("emitConsole.probes.places[0].x"), 5)
             self.assert_stays_on_this_machine(daemon)
+
+    def test_shows_the_axes_of_the_motion_simulator_over_time(self):
+        # One ring carries all of the swing. The table follows it by a known time late, so that the error is known too.
+        amplitude_rad, rate_rad_s, delay_s = 0.1, 2.0, 0.04
+        with swinging_axes(300, amplitude_rad, rate_rad_s, delay_s) as daemon:
+            self.open(daemon)
+            axis = "emitConsole.axes.axes[{}]"
+            span = ("(() => { let low = Infinity, high = -Infinity; {0}.{1}.each(-Infinity, (_, v) => {"
+                    "if (Number.isFinite(v)) { low = Math.min(low, v); high = Math.max(high, v); } });"
+                    "return high - low; })()")
+
+            def span_of(i, what):
+                return self.page.evaluate(span.replace("{0}", axis.format(i)).replace("{1}", what))
+
+            self.page.wait_for("document.querySelector('#axes-state').textContent.startsWith('following')", PATIENCE_S)
+            self.page.evaluate("emitConsole.axes.axes.forEach((one) => {"
+                               "one.demand.clear(); one.measured.clear(); one.error.clear(); })")
+            # Two periods of the swing.
+            self.page.wait_for("emitConsole.axes.axes[0].error.count > 310", PATIENCE_S)
+            full_deg = 2 * math.degrees(amplitude_rad)
+            demanded = [span_of(i, "demand") for i in range(3)]
+            swinging = max(range(3), key=lambda i: demanded[i])
+            self.assertAlmostEqual(demanded[swinging], full_deg, delta=0.03 * full_deg)
+            self.assertAlmostEqual(span_of(swinging, "measured"), full_deg, delta=0.03 * full_deg)
+            for other in set(range(3)) - {swinging}:
+                self.assertLess(demanded[other], 0.01 * full_deg)
+            # sin(a - b) - sin(a) has the amplitude 2 sin(b / 2).
+            error_mdeg = 1000 * full_deg * 2 * math.sin(0.5 * rate_rad_s * delay_s)
+            self.assertAlmostEqual(span_of(swinging, "error"), error_mdeg, delta=0.1 * error_mdeg)
+            # Strips are drawn, and the keyboard and a click choose the axis.
+            self.page.press("a")
+            self.page.evaluate(f"document.querySelector('#axes').tBodies[0].rows[{swinging}].cells[0].click()")
+            self.assertEqual(self.page.evaluate("emitConsole.axes.chosen"), swinging)
+            for canvas in ("#axes-strip", "#axes-error-strip"):
+                colors = self.page.evaluate(
+                    f"(() => {{ const c = document.querySelector('{canvas}'); const d = c.getContext('2d')"
+                    ".getImageData(0, 0, c.width, c.height).data; const seen = new Set();"
+                    "for (let i = 0; i < d.length; i += 4) seen.add(d[i] << 16 | d[i + 1] << 8 | d[i + 2]);"
+                    "return seen.size; })()")
+                self.assertGreater(colors, 8, canvas)
+            self.keep("axes")
+            self.assert_stays_on_this_machine(daemon)
+
+    def keep(self, name):
+        """Leaves a picture of the page in the folder that TEST_PICTURES names, if it names one."""
+        folder = os.environ.get("TEST_PICTURES")
+        if folder:
+            self.page.screenshot(f"{folder}/{name}.png")
 
     def test_a_page_that_does_not_draw_costs_a_stream_no_frame(self):
         with start(IG_CLOCK) as daemon, FrameClient.connect(daemon.tcp_url) as client:

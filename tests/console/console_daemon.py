@@ -1,6 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """A real emitd with canned frames and a console."""
-from daemon import Daemon
+import contextlib
+import math
+import pathlib
+import signal
+import subprocess
+import tempfile
+
+from daemon import BIN_DIR, Daemon
 
 WIDTH_PX, HEIGHT_PX = 160, 120
 STEP_NS = 5_000_000
@@ -9,6 +16,35 @@ IG_CLOCK = 'mode = "ig-clock"\nrate_hz = 50.0'
 
 def start(pacing, address="127.0.0.1:0", more=""):
     return Daemon(WIDTH_PX, HEIGHT_PX, pacing, more=f'[console]\nlisten = "{address}"\nrate_hz = 20.0\n{more}')
+
+
+@contextlib.contextmanager
+def swinging_axes(seconds, amplitude_rad, rate_rad_s, delay_s):
+    """A daemon with a motion simulator of three axes that follow without error but `delay_s` late, and a host whose
+    seeker swings about north in heading."""
+    with contextlib.ExitStack() as stack:
+        folder = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        table = subprocess.Popen([BIN_DIR / "emit", "fms-sim", "--listen", "127.0.0.1:0", "--axes", "3",
+                              "--delay-ms", str(1000 * delay_s), "--noise-arcsec", "0"],
+                                 stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        stack.callback(lambda: (table.send_signal(signal.SIGINT), table.wait(30), table.stdout.close()))
+        controller = table.stdout.readline().split("axes_udp=")[1].strip()
+        axes = "{ min_deg = -100, max_deg = 100, rate_deg_s = 300, acceleration_deg_s2 = 5000 }, " * 3
+        motion = f'[motion]\ncontroller = "{controller}"\nfeedback_timeout_ms = 1000\naxes = [{axes}]\n'
+        daemon = stack.enter_context(start(IG_CLOCK, more=motion))
+        poses = folder / "poses.csv"
+        with poses.open("w") as out:
+            out.write("sim_time_s,east_m,north_m,up_m,qw,qx,qy,qz\n")
+            for i in range(100 * seconds):
+                half_rad = 0.5 * amplitude_rad * math.sin(0.01 * rate_rad_s * i)
+                # World from body for a heading: half a turn about the axis between north and east.
+                c = math.sqrt(0.5) * (math.cos(half_rad) + math.sin(half_rad))
+                s = math.sqrt(0.5) * (math.cos(half_rad) - math.sin(half_rad))
+                out.write(f"{0.01 * i:.3f},0,0,10,0,{c!r},{s!r},0\n")
+        host = subprocess.Popen([BIN_DIR / "emit", "send", poses, "--to", daemon.host_url],
+                                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        stack.callback(lambda: (host.send_signal(signal.SIGINT), host.wait(30)))
+        yield daemon
 
 
 def address_of(daemon):

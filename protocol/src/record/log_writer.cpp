@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <google/protobuf/descriptor.h>
-#include <google/protobuf/descriptor.pb.h>
 
 #include <algorithm>
-#include <set>
 #include <string>
 
 #include "emit/protocol/convert.hpp"
 #include "emit/protocol/record/log.hpp"
 #include "emit/protocol/record/mcap_writer.hpp"
+#include "emit/protocol/record/message_schema.hpp"
 #include "emit/v1/control.pb.h"
 #include "emit/v1/frame.pb.h"
 #include "emit/v1/host.pb.h"
@@ -17,23 +16,6 @@ namespace emit::protocol {
 namespace {
 
 using physics::Result;
-
-/// Adds a file's descriptor behind those of its imports, each file once.
-void add_with_imports(const google::protobuf::FileDescriptor& file, std::set<std::string>& added,
-                      google::protobuf::FileDescriptorSet& out) {
-  if (!added.insert(file.name()).second) return;
-  for (int i = 0; i < file.dependency_count(); ++i) {
-    add_with_imports(*file.dependency(i), added, out);
-  }
-  file.CopyTo(out.add_file());
-}
-
-std::string file_descriptor_set(const google::protobuf::Descriptor& message) {
-  google::protobuf::FileDescriptorSet set;
-  std::set<std::string> added;
-  add_with_imports(*message.file(), added, set);
-  return set.SerializeAsString();
-}
 
 Result<std::uint16_t> add_topic(McapWriter& mcap, const char* topic,
                                 const google::protobuf::Descriptor& message) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "agents/motion/motion_agent.hpp"
 
+#include <algorithm>
+
 namespace emit::server {
 namespace {
 
@@ -106,6 +108,20 @@ void MotionAgent::show(const AxisFeedback& feedback) noexcept {
     board.measured_rad[i].store(measured[i], std::memory_order_relaxed);
   }
   board.measured_ns.store(feedback.time_ns, std::memory_order_relaxed);
+  if (!board.watched.load(std::memory_order_relaxed)) return;
+  // A clock that was set back begins anew.
+  const std::int64_t since_ns = feedback.time_ns - ticked_ns_;
+  if (since_ns >= 0 && since_ns < kAxesTickNs) return;
+  AxesTick* tick = context_.axes_ticks.claim();
+  if (tick == nullptr) return;  // a page that does not look loses ticks, and nobody waits for it
+  ticked_ns_ = feedback.time_ns;
+  const std::span<const double> asked_rad = follower_.asked_rad();
+  tick->time_ns = feedback.time_ns;
+  tick->count = static_cast<std::uint8_t>(board.count.load(std::memory_order_relaxed));
+  tick->driven = !asked_rad.empty();
+  tick->measured_rad = measured;
+  std::ranges::copy(asked_rad, tick->demanded_rad.begin());
+  context_.axes_ticks.commit();
 }
 
 void MotionAgent::note_status() noexcept {

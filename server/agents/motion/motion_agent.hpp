@@ -49,6 +49,7 @@ class MotionAgent final : public Agent {
   std::int64_t period_ns_;
   std::int64_t due_ns_ = 0;      ///< instant of the next command, wall
   TableFollower::Status known_;  ///< as the conductor and the log know it
+  std::int64_t ticked_ns_ = 0;   ///< instant of the latest AxesTick
   bool reported_ = false;        ///< since the latest command
 };
 

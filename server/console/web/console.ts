@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The operator's console: wires image, limits, probes, strips and commands together.
 
+import { AxesPanel } from "./axes.js";
 import { colorTable, cssColor, PROBE_COLORS } from "./colors.js";
 import { channelName, duration, element, Panels, Toast } from "./display.js";
 import { ImageView, percentiles, Point } from "./image.js";
@@ -21,6 +22,7 @@ const CONFIRM_MS = 3000;
 class Console {
   private readonly image = new ImageView(element("image"), element("overlay"));
   private readonly panels = new Panels();
+  private readonly axes = new AxesPanel();
   private readonly toast = new Toast();
   private readonly probes = new Probes();
   private readonly link: Link;
@@ -70,6 +72,7 @@ class Console {
     this.tables.clear();
     if (this.channel >= hello.channels.length) this.channel = 0;
     this.panels.hello(hello);
+    this.axes.show(hello.motion);
     element("title").textContent = hello.scenario || "canned frames";
     element("about").textContent = `${hello.software} \u00b7 ${hello.pacing} \u00b7 ${hello.device}`;
     const select = element<HTMLSelectElement>("channel");
@@ -85,6 +88,7 @@ class Console {
 
   status(status: Status): void {
     this.panels.status(status);
+    this.axes.take(status.axes);
     const state = !status.running ? "stopped" : status.held ? "held" : "running";
     const pill = element("state");
     pill.textContent = status.ready ? state : "not ready";
@@ -541,6 +545,7 @@ class Console {
         { keys: ["."], label: "", help: "", run: () => this.moveLimit("high", 1) },
         { keys: ["j"], label: "J  K", help: "Next, previous channel", run: () => this.nextChannel(1) },
         { keys: ["k"], label: "", help: "", run: () => this.nextChannel(-1) },
+        { keys: ["a"], label: "A", help: "Next axis of the motion simulator", run: () => this.axes.next() },
         arrow("ArrowLeft", -1, 0, "Arrows", "Move the cursor by a pixel, with Shift by ten"),
         arrow("ArrowRight", 1, 0, "", ""),
         arrow("ArrowUp", 0, -1, "", ""),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The panels beside the image: clients, counters, warnings, channels, axes.
+// The panels beside the image: clients, counters, warnings, channels.
 
 import { Answer, Channel, Hello, Status } from "./link.js";
 
@@ -8,12 +8,6 @@ export function element<T extends HTMLElement>(id: string): T {
   if (found === null) throw new Error(`the page has no #${id}`);
   return found as T;
 }
-
-const MOTION_STATES = ["none", "waiting", "parked", "parking", "capturing", "following", "fault"];
-const MOTION_FAULTS = [
-  "no measurements", "no poses", "interlock open", "axis at a limit", "axes nearly parallel", "simulation clock jumped",
-  "clocks differ", "commands not followed",
-];
 
 /** Counters that grow when something was not right. */
 const FAULTS = new RegExp(
@@ -25,7 +19,7 @@ const FAULTS = new RegExp(
   ].join("|"),
 );
 
-function fillTable(table: HTMLTableElement, rows: (string | { text: string; kind: string })[][]): void {
+export function fillTable(table: HTMLTableElement, rows: (string | { text: string; kind: string })[][]): void {
   const body = table.tBodies[0];
   while (body.rows.length > rows.length) body.deleteRow(-1);
   rows.forEach((cells, i) => {
@@ -45,7 +39,7 @@ function count(value: number): string {
   return value.toLocaleString("en-US").replace(/,/g, "\u2009");
 }
 
-function ms(us: number | undefined): string {
+export function ms(us: number | undefined): string {
   return us === undefined ? "" : (us / 1000).toFixed(us < 10000 ? 3 : 1);
 }
 
@@ -79,7 +73,6 @@ export class Panels {
         channel.quantity,
       ]),
     );
-    element("axes-panel").hidden = !hello.motion;
   }
 
   status(status: Status): void {
@@ -113,7 +106,6 @@ export class Panels {
       element<HTMLTableElement>("agents"),
       status.agents.map((agent) => [agent.name, ms(agent.max_us), count(agent.over), agent.busy_s.toFixed(1)]),
     );
-    this.axes(status);
   }
 
   private faults(status: Status): void {
@@ -143,25 +135,6 @@ export class Panels {
     const badge = element("fault-count");
     badge.textContent = fresh > 0 ? `${fresh} growing` : "";
     badge.className = fresh > 0 ? "badge bad" : "badge";
-  }
-
-  private axes(status: Status): void {
-    const axes = status.axes;
-    const names = ["unit 1", "unit 2", "unit 3", "target azimuth", "target elevation"];
-    const faults = MOTION_FAULTS.filter((_, bit) => (axes.faults & (1 << bit)) !== 0);
-    const age = axes.age_us === null ? "no measurement" : `measured ${ms(axes.age_us)} ms ago`;
-    element("axes-state").textContent =
-      `${MOTION_STATES[axes.state] ?? "?"}, ${age}${faults.length > 0 ? `: ${faults.join(", ")}` : ""}`;
-    element("axes-state").className = faults.length > 0 ? "bad" : "";
-    fillTable(
-      element<HTMLTableElement>("axes"),
-      axes.measured_deg.map((measured, i) => [
-        names[i] ?? String(i + 1),
-        axes.commanded_deg[i].toFixed(4),
-        measured.toFixed(4),
-        (measured - axes.commanded_deg[i]).toFixed(4),
-      ]),
-    );
   }
 }
 

@@ -62,6 +62,8 @@ export interface Axes {
   age_us: number | null;
   measured_deg: number[];
   commanded_deg: number[];
+  /** Age at the status in ms; angles measured, and those commanded for that instant, none unless emitd commands. */
+  ticks: [number, number[], number[]][];
 }
 
 /** Frame number, flags, age at the status in ms; frame time, its deadline, latency, its deadline in us. */

@@ -73,6 +73,8 @@ class Campaign {
   [[nodiscard]] Result<void> check_elements();
   [[nodiscard]] std::vector<std::size_t> pending(bool with_final) const;
   [[nodiscard]] Result<void> execute();
+  /// Says why an element has no result.
+  [[nodiscard]] std::string reason_of(std::size_t element) const;
   void collect();
   [[nodiscard]] Result<void> report() const;
 
@@ -127,13 +129,23 @@ Result<void> Campaign::execute() {
   std::vector<std::size_t> todo = pending(true);
   resumed_ = elements_.size() - todo.size();
   for (; !todo.empty() && tries_ <= campaign_.run.retries; ++tries_) {
-    for (const std::size_t element : todo) store_.forget_failure(element);
+    for (const std::size_t element : todo) store_.forget(element);
     Progress bar(tries_ == 0 ? "elements" : "elements tried again", todo.size());
     auto done = executor->run(todo, [&bar](std::size_t ended) { bar.advance_to(ended); });
     if (!done) return done;
     todo = pending(false);
   }
   return {};
+}
+
+std::string Campaign::reason_of(std::size_t element) const {
+  if (const auto failure = store_.failure(element)) return failure->text;
+  if (store_.has_row(element)) {
+    return "its result is of other conditions or of another version of emit: a file of the "
+           "campaign or the program was changed while it ran";
+  }
+  return fmt::format("it ended without a word, as a process does that is killed; see {}",
+                     store_.log_file(element).string());
 }
 
 void Campaign::collect() {
@@ -143,12 +155,7 @@ void Campaign::collect() {
       results_.rows.push_back(std::move(*row));
       continue;
     }
-    const auto failure = store_.failure(element.number);
-    results_.missing.push_back(
-        {element.number,
-         failure ? failure->text
-                 : fmt::format("it ended without a word, as a process does that is killed; see {}",
-                               store_.log_file(element.number).string())});
+    results_.missing.push_back({element.number, reason_of(element.number)});
   }
 }
 

@@ -73,9 +73,15 @@ std::optional<ElementStore::Failure> ElementStore::failure(std::size_t element) 
   return Failure{final, final ? text.substr(kFinal.size()) : text};
 }
 
-void ElementStore::forget_failure(std::size_t element) const {
+bool ElementStore::has_row(std::size_t element) const {
+  std::error_code ignored;
+  return std::filesystem::exists(file(element, ".csv"), ignored);
+}
+
+void ElementStore::forget(std::size_t element) const {
   std::error_code ignored;
   std::filesystem::remove(file(element, ".error"), ignored);
+  std::filesystem::remove(file(element, ".csv"), ignored);
 }
 
 }  // namespace emit::tool

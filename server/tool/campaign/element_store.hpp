@@ -35,8 +35,10 @@ class ElementStore {
   };
   /// Returns the error of an element; empty for one that left none, as one that was killed.
   [[nodiscard]] std::optional<Failure> failure(std::size_t element) const;
-  /// Forgets the error of an element, before another try.
-  void forget_failure(std::size_t element) const;
+  /// Returns true if the element left a row, whatever its identity is.
+  [[nodiscard]] bool has_row(std::size_t element) const;
+  /// Forgets the error and the row of an element, before another try.
+  void forget(std::size_t element) const;
 
   [[nodiscard]] std::filesystem::path log_file(std::size_t element) const;
   [[nodiscard]] const std::filesystem::path& folder() const noexcept { return folder_; }

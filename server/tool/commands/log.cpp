@@ -11,6 +11,7 @@
 #include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
 #include "tool/commands/log_commands.hpp"
+#include "tool/foxglove/foxglove_command.hpp"
 #include "tool/streams/frame_log_export.hpp"
 #include "tool/streams/pose_log.hpp"
 #include "tool/support/console.hpp"
@@ -326,7 +327,8 @@ void add_log(CommandLine& tool) {
       "         emit log cut run.mcap --from-s 10 --to-s 12.5 --out cut.mcap\n"
       "         emit log merge journal.*.mcap journal.mcap --out all.mcap\n"
       "         emit log export csv run.mcap --out tables\n"
-      "         emit log export exr run.mcap --out frames");
+      "         emit log export exr run.mcap --out frames\n"
+      "         emit log export foxglove run.mcap --out run.foxglove.mcap");
   add_log_info(log);
   log.command<CutOptions>(
       {.name = "cut",
@@ -351,6 +353,7 @@ void add_log(CommandLine& tool) {
        .text = "Write the images of a log as OpenEXR, and compare them with its journal",
        .example = "emit log export exr run.mcap --out frames"},
       add_export_frames_options, run_export_frames);
+  add_log_export_foxglove(tables);
 }
 
 }  // namespace emit::tool

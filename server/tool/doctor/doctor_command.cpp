@@ -31,7 +31,7 @@ const char* name_of(Severity severity) {
     case Severity::fail:
       break;
   }
-  return "FAIL";
+  return "fail";
 }
 
 int run(const DoctorOptions& command) {
@@ -55,12 +55,11 @@ int run(const DoctorOptions& command) {
   if (command.json) {
     Json rows = Json::array();
     for (const Finding& each : findings) {
-      rows.push(
-          Json::object()
-              .set("severity", each.severity == Severity::fail ? "fail" : name_of(each.severity))
-              .set("item", each.item)
-              .set("found", each.found)
-              .set("remedy", each.remedy));
+      rows.push(Json::object()
+                    .set("severity", name_of(each.severity))
+                    .set("item", each.item)
+                    .set("found", each.found)
+                    .set("remedy", each.remedy));
     }
     Json json = Json::object();
     json.set("real_time", command.needs.real_time)

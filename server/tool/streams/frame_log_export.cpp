@@ -77,7 +77,6 @@ Result<void> write_image(const std::filesystem::path& folder, const v1::Recorded
                          std::span<const float> pixels) {
   const auto header = protocol::decode_frame_header(std::as_bytes(std::span(frame.header())));
   if (!header) return tl::unexpected(header.error());
-  const v1::ChannelInfo& channel = frame.channel();
   FramePlanes planes;
   planes.width_px = frame.width_px();
   planes.height_px = frame.height_px();
@@ -89,18 +88,24 @@ Result<void> write_image(const std::filesystem::path& folder, const v1::Recorded
   planes.applied_shift_y_px = header->applied_shift_y_px;
   planes.sensor_width_px = header->sensor_width_px;
   planes.sensor_height_px = header->sensor_height_px;
+  planes.metadata = recorded_metadata(frame, *header);
+  return write_frame_exr(folder / fmt::format("frame_{:06}.exr", frame.frame_number()), planes);
+}
+
+}  // namespace
+
+image::FrameMetadata recorded_metadata(const v1::RecordedFrame& frame,
+                                       const protocol::FrameHeader& header) {
+  const v1::ChannelInfo& channel = frame.channel();
   std::vector<physics::ResponsePoint> response;
   const int samples = std::min(channel.response_um_size(), channel.response_frac_size());
   for (int i = 0; i < samples; ++i) {
     response.push_back({channel.response_um(i), channel.response_frac(i)});
   }
-  planes.metadata = {frame.sim_time_ns(),  frame.frame_number(), header->pose, channel.band(),
-                     channel.band_lo_um(), channel.band_hi_um(), frame.unit(), response,
-                     header->fov_h_rad};
-  return write_frame_exr(folder / fmt::format("frame_{:06}.exr", frame.frame_number()), planes);
+  return {frame.sim_time_ns(),  frame.frame_number(), header.pose,  channel.band(),
+          channel.band_lo_um(), channel.band_hi_um(), frame.unit(), response,
+          header.fov_h_rad};
 }
-
-}  // namespace
 
 Result<FrameExportSummary> export_log_frames(const std::filesystem::path& file,
                                              const std::filesystem::path& folder,

@@ -5,10 +5,22 @@
 #include <optional>
 #include <string>
 
+#include "emit/image/exr_image.hpp"
 #include "emit/physics/error.hpp"
+#include "emit/protocol/frame_header.hpp"
 #include "emit/protocol/record/log_outline.hpp"
 
+namespace emit::v1 {
+class RecordedFrame;
+}
+
 namespace emit::tool {
+
+/// Returns what a picture file says of an image of a log: time, pose, band with its response, unit
+/// and field of view.
+/// @param header  the frame header that the message holds
+[[nodiscard]] image::FrameMetadata recorded_metadata(const v1::RecordedFrame& frame,
+                                                     const protocol::FrameHeader& header);
 
 struct FrameExportOptions {
   std::optional<std::int64_t> from_ns{};  ///< first simulation time, ns; absent: the begin

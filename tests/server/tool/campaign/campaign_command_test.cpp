@@ -2,11 +2,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <vector>
 
+#include "support/daemon_process.hpp"
 #include "support/emit_process.hpp"
 
 namespace emit::test {
@@ -115,6 +118,27 @@ TEST(CliCampaign, a_killed_element_is_tried_again) {
             std::string::npos)
       << result.out;
   EXPECT_NE(result.err.find("ended without a word"), std::string::npos) << result.err;
+}
+
+TEST(CliCampaign, a_file_that_changes_meanwhile_is_named_as_the_reason) {
+  const ScratchFolder folder;
+  const std::string text = std::string(kHead) +
+                           "[[vary]]\nkey = \"weather.wind_m_s\"\nvalues = [1.0, 2.0, 3.0]\n"
+                           "[truth]\nkind = \"none\"\n[run]\nretries = 0\njobs = 1\n";
+  folder.write("c.toml", text);
+  ToolProcess campaign(folder, "campaign",
+                       {"campaign", folder.file("c.toml"), "--out", folder.file("o")});
+  while (!std::filesystem::exists(folder.file("o/elements/000000.csv")) && !campaign.ended()) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  std::string changed = text;
+  changed.replace(changed.find("steps=5"), 7, "steps=6");
+  folder.write("c.toml", changed);
+  ASSERT_EQ(campaign.wait(std::chrono::seconds(240)), 1) << campaign.out() << campaign.err();
+  EXPECT_NE(campaign.err().find("element 5 "), std::string::npos) << campaign.err();
+  EXPECT_NE(campaign.err().find("of other conditions or of another version"), std::string::npos)
+      << campaign.err();
+  EXPECT_EQ(campaign.err().find("ended without a word"), std::string::npos) << campaign.err();
 }
 
 TEST(CliCampaign, a_wrong_key_is_found_before_anything_runs) {

@@ -23,7 +23,7 @@ ProcessResult run_doctor_without(const std::string& library) {
 TEST(DoctorCommand, FailsWithItsNameWhereEglIsMissing) {
   const ProcessResult result = run_doctor_without("libEGL.so.1");
   EXPECT_EQ(result.exit_code, 1) << result.err;
-  EXPECT_THAT(result.out, HasSubstr("FAIL  device.gpu_index 0"));
+  EXPECT_THAT(result.out, HasSubstr("fail  device.gpu_index 0"));
   EXPECT_THAT(result.out, HasSubstr("libEGL.so.1"));
   EXPECT_THAT(result.out, HasSubstr("pass, ")) << "the other findings follow";
 }
