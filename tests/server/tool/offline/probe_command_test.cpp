@@ -96,7 +96,7 @@ TEST(CliProbe, temperatures_are_those_of_the_reference_solution) {
   ASSERT_EQ(probed.exit_code, 0) << probed.err;
   const ProcessResult solved = run_emit(
       {"solve", "block-on-road", "--times", "08:00,09:30", "--at", folder.file("at.csv"),
-       "--at-out", folder.file("s.csv"), "--refine", "0.2", "--spin-up-h", "48", "--rays", "32"},
+       "--at-out", folder.file("s.csv"), "--refine", "0.3", "--rays", "64"},
       std::chrono::seconds(300));
   ASSERT_EQ(solved.exit_code, 0) << solved.err;
   const std::vector<Row> ours = rows_of(read_text(folder.file("p.csv")));
