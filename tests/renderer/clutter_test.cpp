@@ -195,7 +195,7 @@ TEST(Clutter, KeepsItsContrastHoweverTheSensorRolls) {
   clutter.shortest_m = 0.05;
   clutter.longest_m = 0.8;
   Eye eye(varied_ground(clutter, 400.0));
-  // At 7 degrees a pixel is eight times as long as it is wide.
+  // A pixel at 7 degrees is eight times as long as it is wide.
   const auto rolled = [&](double roll_deg) {
     const physics::Pose pose{{0.0, -245.0, 30.0},
                              physics::world_from_body_heading_pitch_roll(

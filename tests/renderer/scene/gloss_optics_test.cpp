@@ -5,7 +5,7 @@
 
 #include "emit/scene/gloss_optics.hpp"
 
-/// What a glossy material states against what its facets show.
+/// Emissivities that a glossy material states against those that its facets show.
 namespace emit::scene {
 namespace {
 
@@ -28,7 +28,7 @@ TEST(GlossOptics, TheStatedEmissivityHoldsHoweverRoughTheFacetsAre) {
     for (const double slope : {0.002, 0.1, 0.3, 0.6, 1.0}) {
       Material material = glossy(index, slope);
       const physics::Facets facets = facets_of(material, {});
-      // Without a list the total emissivity is that over the hemisphere.
+      // If no list has the band, the total emissivity is that over the hemisphere.
       const physics::Lobe total = physics::make_lobe(facets, facet_optics(material, facets, kBand));
       EXPECT_NEAR(total.hemispherical_emissivity_frac, 0.7, 1e-9) << index << ", " << slope;
       // A listed one is that along the normal.
@@ -45,8 +45,8 @@ TEST(GlossOptics, FacetsLetThroughWhatABlackBodyUnderThemEmits) {
     Material material = glossy(2.5, slope);
     const physics::Facets facets = facets_of(material, {});
     const physics::LobeCurve passed = physics::passed_frac(
-        facets, interface_reflectance_frac(*material.gloss, spectral_band(kBand),
-                                           physics::Kelvin(300.0)));
+        facets,
+        interface_reflectance_frac(*material.gloss, spectral_band(kBand), physics::Kelvin(300.0)));
     // The limits of the check are just there.
     material.band_emissivity = {{"8-12", passed.back()}};
     EXPECT_TRUE(check_emissivities(material, facets, {kBand}).has_value()) << slope;

@@ -217,7 +217,7 @@ TEST(Cameras, LookAheadToWhereTheNextFrameWillBe) {
     const glm::dvec3& now_m = frame.image.cameras[0].pose.position_world_m;
     const glm::dvec3& ahead_m = frame.image.cameras[2].pose.position_world_m;
     const glm::dvec3& next_m = next.image.cameras[0].pose.position_world_m;
-    // What the frame foresees is what the next frame shows, also where the host is silent.
+    // The next frame shows what this one foresees, also where the host is silent.
     EXPECT_EQ(ahead.sim_time_ns, next.header.sim_time_ns) << i;
     EXPECT_NEAR(ahead_m.x, next_m.x, 1e-9) << i;
     const std::int64_t by_ns = ahead.sim_time_ns - frame.header.sim_time_ns;

@@ -86,7 +86,7 @@ double hemispherical_mean(const LobeCurve& curve) noexcept {
 
 namespace {
 
-/// What facets do whatever lies under them. `lobe` has its directions and the masking alone.
+/// Reflections of facets over any body. `lobe` has its directions and the masking alone.
 struct Reflected {
   Lobe lobe;
   LobeCurve once{};    ///< share that facets reflect once

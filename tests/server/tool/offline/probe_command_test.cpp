@@ -94,10 +94,10 @@ TEST(CliProbe, temperatures_are_those_of_the_reference_solution) {
   const ProcessResult probed = run_emit(probe(
       {"--at", folder.file("at.csv"), "--times", "08:00,09:30", "--out", folder.file("p.csv")}));
   ASSERT_EQ(probed.exit_code, 0) << probed.err;
-  const ProcessResult solved = run_emit(
-      {"solve", "block-on-road", "--times", "08:00,09:30", "--at", folder.file("at.csv"),
-       "--at-out", folder.file("s.csv"), "--refine", "0.3", "--rays", "64"},
-      std::chrono::seconds(300));
+  const ProcessResult solved =
+      run_emit({"solve", "block-on-road", "--times", "08:00,09:30", "--at", folder.file("at.csv"),
+                "--at-out", folder.file("s.csv"), "--refine", "0.3", "--rays", "64"},
+               std::chrono::seconds(300));
   ASSERT_EQ(solved.exit_code, 0) << solved.err;
   const std::vector<Row> ours = rows_of(read_text(folder.file("p.csv")));
   const std::vector<Row> truth = rows_of(read_text(folder.file("s.csv")));
