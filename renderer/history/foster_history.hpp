@@ -44,9 +44,9 @@ void number_water(std::span<FosterMaterial> materials);
 
 /// History of the surroundings' temperature, and table of the states in which unshadowed surfaces
 /// begin the history. Owner: Renderer.
-/// Thread: the renderer's.  Real time: update is RT-safe and takes microseconds. When the host
-/// changed the weather before the history's start, the spin-up runs again (tens of milliseconds per
-/// material).
+/// Thread: the renderer's.  Real time: update is RT-safe and takes some microseconds per interval
+/// and per ground that holds water. When the host changed the weather before the history's start,
+/// the spin-up runs again (tens of milliseconds per material).
 class FosterHistory {
  public:
   /// Number and total length of the intervals at the end of the spin-up that are computed per
