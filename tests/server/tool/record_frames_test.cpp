@@ -20,14 +20,15 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr std::size_t kFrames = 6;
+constexpr std::size_t kRecordedFrames = 6;
 
 class RecordFrames : public ::testing::Test {
  protected:
   /// Records a run of canned frames with their images, while a client receives them.
   void SetUp() override {
     std::string poses = "sim_time_s,east_m,north_m,up_m,qw,qx,qy,qz\n";
-    for (std::size_t i = 0; i < kFrames; ++i) poses += fmt::format("0.{}0,{},0,10,1,0,0,0\n", i, i);
+    for (std::size_t i = 0; i < kRecordedFrames; ++i)
+      poses += fmt::format("0.{}0,{},0,10,1,0,0,0\n", i, i);
     const std::string sent = folder_.write("poses.csv", poses);
     DaemonProcess daemon(
         folder_,
@@ -35,12 +36,13 @@ class RecordFrames : public ::testing::Test {
     ASSERT_TRUE(daemon.wait_ready()) << folder_.read("stderr");
     const std::string url = "tcp://" + daemon.control();
     ToolProcess client(folder_, "receive",
-                       {"receive", url, "--frames", fmt::format("{}", kFrames), "--out",
+                       {"receive", url, "--frames", fmt::format("{}", kRecordedFrames), "--out",
                         folder_.file("received")});
     ASSERT_TRUE(client.says("emit: emitd "));
-    ToolProcess recorder(folder_, "record",
-                         {"record", "--from", url, "--out", log_, "--with-frames", "--frames",
-                          fmt::format("{}", kFrames), "--json", folder_.file("record.json")});
+    ToolProcess recorder(
+        folder_, "record",
+        {"record", "--from", url, "--out", log_, "--with-frames", "--frames",
+         fmt::format("{}", kRecordedFrames), "--json", folder_.file("record.json")});
     // The recorder subscribes before it creates the log.
     while (!std::filesystem::exists(log_) && !recorder.ended()) std::this_thread::yield();
     const ProcessResult played = run_emit({"send", sent, "--to", url, "--step"});
@@ -54,8 +56,8 @@ class RecordFrames : public ::testing::Test {
 
 TEST_F(RecordFrames, are_the_images_that_a_client_received) {
   const std::string json = folder_.read("record.json");
-  EXPECT_EQ(json_value(json, "images"), fmt::format("{}", kFrames));
-  EXPECT_EQ(json_value(json, "images_compared"), fmt::format("{}", kFrames));
+  EXPECT_EQ(json_value(json, "images"), fmt::format("{}", kRecordedFrames));
+  EXPECT_EQ(json_value(json, "images_compared"), fmt::format("{}", kRecordedFrames));
   EXPECT_EQ(json_value(json, "images_differ"), "0");
   EXPECT_EQ(json_value(json, "images_lost"), "0");
   EXPECT_LT(std::stoull(json_value(json, "stored_image_bytes")),
@@ -67,7 +69,7 @@ TEST_F(RecordFrames, are_the_images_that_a_client_received) {
       run_emit({"log", "export", "exr", log_, "--out", folder_.file("exported")});
   EXPECT_EQ(exported.exit_code, 0) << exported.err;
   EXPECT_THAT(exported.out, HasSubstr("6 images, 6 compared with the journal, 0 differ"));
-  for (std::size_t i = 1; i <= kFrames; ++i) {
+  for (std::size_t i = 1; i <= kRecordedFrames; ++i) {
     const std::string name = fmt::format("frame_{:06}.exr", i);
     const ProcessResult same =
         run_emit({"compare", folder_.file("received/" + name), folder_.file("exported/" + name),
@@ -107,7 +109,7 @@ TEST_F(RecordFrames, describe_themselves) {
     EXPECT_EQ(header->payload_crc32c, frame.crc32c());
     EXPECT_EQ(header->sim_time_ns, frame.sim_time_ns());
   }
-  EXPECT_EQ(number, kFrames);
+  EXPECT_EQ(number, kRecordedFrames);
 }
 
 TEST(ExportFrames, a_log_without_images_says_how_to_get_them) {
