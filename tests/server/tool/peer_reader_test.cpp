@@ -32,9 +32,9 @@ TEST(PeerReader, another_program_reads_a_journal_by_its_index) {
     GTEST_SKIP() << "node with @mcap/core is missing: deploy/scripts/install_deps.sh --with-peers";
   }
   const ScratchFolder folder;
-  constexpr int kFrames = 4000;  // several chunks of 256 KiB
+  constexpr int kReadFrames = 4000;  // several chunks of 256 KiB
   std::string poses = "sim_time_s,east_m,north_m,up_m,qw,qx,qy,qz\n";
-  for (int i = 0; i < kFrames; ++i) poses += fmt::format("{:.3f},{},0,10,1,0,0,0\n", 0.005 * i, i);
+  for (int i = 0; i < kReadFrames; ++i) poses += fmt::format("{:.3f},{},0,10,1,0,0,0\n", 0.005 * i, i);
   const std::string log = folder.write("poses.csv", poses);
   {
     DaemonProcess daemon(
@@ -69,7 +69,7 @@ TEST(PeerReader, another_program_reads_a_journal_by_its_index) {
     frames.push_back(std::to_string(entry.frame().frame_number()));
     crcs.push_back(std::to_string(entry.frame().radiance_crc32c()));
   }
-  ASSERT_EQ(frames.size(), static_cast<std::size_t>(kFrames));
+  ASSERT_EQ(frames.size(), static_cast<std::size_t>(kReadFrames));
   const std::string seen = packed(peer.out);
   EXPECT_THAT(seen, HasSubstr("\"topics\":[\"host\",\"journal\"]"));
   EXPECT_THAT(seen, HasSubstr(fmt::format("\"messages\":\"{}\"", messages)));
@@ -83,7 +83,7 @@ TEST(PeerReader, another_program_reads_a_journal_by_its_index) {
   const std::string late = json_value(peer.out, "late_bytes");
   ASSERT_FALSE(late.empty());
   EXPECT_LT(std::stoull(late), 3 * std::filesystem::file_size(journal) / 4);
-  EXPECT_THAT(seen, HasSubstr(fmt::format(",{}],\"late_bytes\"", kFrames)));
+  EXPECT_THAT(seen, HasSubstr(fmt::format(",{}],\"late_bytes\"", kReadFrames)));
 }
 
 }  // namespace
