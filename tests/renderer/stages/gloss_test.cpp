@@ -323,11 +323,11 @@ TEST(Gloss, APanelReflectsTheSkyAroundItsMirrorDirection) {
           for (std::size_t n = 0; n < physics::kLobeNodes; ++n) {
             reflectance[n] = fresnel(kIndex, physics::lobe_cosine(n));
           }
-          const physics::Lobe model =
-              physics::make_lobe({physics::FacetSlopes::ggx, slope},
-                                 {reflectance, reflectance, 1.0,
-                                  0.8 / physics::hemispherical_mean(physics::passed_frac(
-                                            {physics::FacetSlopes::ggx, slope}, reflectance))});
+          const physics::Lobe model = physics::make_lobe(
+              {physics::FacetSlopes::ggx, slope},
+              {reflectance, reflectance, 1.0,
+               std::min(1.0, 0.8 / physics::hemispherical_mean(physics::passed_frac(
+                                       {physics::FacetSlopes::ggx, slope}, reflectance)))});
           const double emissivity = physics::lobe_at(model.emissivity_frac, std::cos(angle));
           const double expected = emissivity * black(scenario.bands[0], kPanelK) + lobe +
                                   (1.0 - emissivity - share) * even;

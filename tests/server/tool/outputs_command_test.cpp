@@ -60,6 +60,7 @@ const std::vector<OutputCase>& output_cases() {
         {"--out", "--json"});
     add({"log", "export", "csv", "no.mcap"}, {}, {"--out"});
     add({"log", "export", "exr", "no.mcap", "--out", "GOOD"}, {"--json"}, {"--out"});
+    add({"log", "export", "foxglove", "no.mcap", "--out", "GOOD"}, {"--json", "--out"});
     add({"fit", "block-on-road"}, {"--out", "--toml", "--json"});
     add({"fit", "--measured", "no.csv"}, {"--plot", "--history"});
     add({"generate", "box", "--out", "GOOD"}, {}, {"--out"});

@@ -34,7 +34,8 @@ TEST(PeerReader, another_program_reads_a_journal_by_its_index) {
   const ScratchFolder folder;
   constexpr int kReadFrames = 4000;  // several chunks of 256 KiB
   std::string poses = "sim_time_s,east_m,north_m,up_m,qw,qx,qy,qz\n";
-  for (int i = 0; i < kReadFrames; ++i) poses += fmt::format("{:.3f},{},0,10,1,0,0,0\n", 0.005 * i, i);
+  for (int i = 0; i < kReadFrames; ++i)
+    poses += fmt::format("{:.3f},{},0,10,1,0,0,0\n", 0.005 * i, i);
   const std::string log = folder.write("poses.csv", poses);
   {
     DaemonProcess daemon(

@@ -85,7 +85,7 @@ TEST_F(BashCompletion, offers_every_command_and_every_suite) {
   EXPECT_EQ(candidates({"bench", ""}), std::set<std::string>(suites.begin(), suites.end()));
   EXPECT_EQ(candidates({"bench", "pap"}), std::set<std::string>{"paper"});
   EXPECT_EQ(candidates({"log", ""}), (std::set<std::string>{"info", "cut", "merge", "export"}));
-  EXPECT_EQ(candidates({"log", "export", ""}), (std::set<std::string>{"csv", "exr"}));
+  EXPECT_EQ(candidates({"log", "export", ""}), (std::set<std::string>{"csv", "exr", "foxglove"}));
 }
 
 TEST_F(BashCompletion, offers_the_options_of_the_command_in_the_line) {
