@@ -310,15 +310,21 @@ TEST(RendererShadow, a_teleport_leaves_the_shade_before_it) {
   EXPECT_LT(share_apart(teleported, switched_off, 1.0), 0.003);
 }
 
-TEST(RendererShadow, a_live_pose_moves_the_caster_from_then_on) {
+/// A crate of 2 m on level ground, as entity 3 at the origin.
+scene::ScenarioDesc crate_on_plane(const glm::dquat& attitude) {
   auto scenario = instant_scenario(write_quads("plane", {ground(30.0, 30.0)}));
   scene::ObjectDesc crate;
   crate.name = "crate";
   crate.entity_id = 3;
   crate.gltf = write_quads("crate", box({-1.0, -1.0, 0.0}, {1.0, 1.0, 2.0}));
-  const glm::dquat north = physics::world_from_body_heading_pitch_roll(0.0, 0.0, 0.0);
-  crate.instances = {{glm::dvec3(0.0), north}};
+  crate.instances = {{glm::dvec3(0.0), attitude}};
   scenario.objects.push_back(crate);
+  return scenario;
+}
+
+TEST(RendererShadow, a_live_pose_moves_the_caster_from_then_on) {
+  const glm::dquat north = physics::world_from_body_heading_pitch_roll(0.0, 0.0, 0.0);
+  const scene::ScenarioDesc scenario = crate_on_plane(north);
   Scene scene(scenario);
   const auto pose = looking({0.0, 0.0, 20.0}, {0.0, 0.0, 0.0});
   EXPECT_EQ(scene.render(pose, kHourNs).object[128 * 320 + 160], 2.0F);
@@ -335,14 +341,8 @@ TEST(RendererShadow, a_live_pose_moves_the_caster_from_then_on) {
 }
 
 TEST(RendererShadow, what_is_foreseen_is_drawn_as_if_it_were_so_and_leaves_no_trace) {
-  auto scenario = instant_scenario(write_quads("plane", {ground(30.0, 30.0)}));
-  scene::ObjectDesc crate;
-  crate.name = "crate";
-  crate.entity_id = 3;
-  crate.gltf = write_quads("crate", box({-1.0, -1.0, 0.0}, {1.0, 1.0, 2.0}));
   const glm::dquat north = physics::world_from_body_heading_pitch_roll(0.0, 0.0, 0.0);
-  crate.instances = {{glm::dvec3(0.0), north}};
-  scenario.objects.push_back(crate);
+  const scene::ScenarioDesc scenario = crate_on_plane(north);
   const auto pose = looking({0.0, 0.0, 20.0}, {0.0, 0.0, 0.0});
   constexpr std::int64_t kNextNs = kHourNs + 10'000'000;
   const renderer::EntityUpdate here{3, {{0.0, 0.0, 0.0}, north}, true, false};

@@ -109,7 +109,8 @@ physics::Result<void> check_emissivities(const Material& material, const physics
     if (!listed) continue;
     const auto reflectance =
         interface_reflectance_frac(*material.gloss, spectral_band(band), kSurface);
-    // What a smooth interface lets through needs no integral over facets, which takes milliseconds.
+    // Compare with a smooth interface first: rough facets let more through, and their integral
+    // takes milliseconds.
     if (*listed <= 1.0 - reflectance.back() + kNormalSlackFrac) continue;
     const double most = physics::passed_frac(facets, reflectance).back();
     if (*listed > most + kNormalSlackFrac) {

@@ -15,6 +15,11 @@ Option add_json(CommandLine& line, std::optional<std::filesystem::path>& target)
   return line.output_file("--json", target, "Write the results as JSON (- for standard output)");
 }
 
+void add_time_range(CommandLine& line, std::optional<double>& from_s, std::optional<double>& to_s) {
+  line.option("--from-s", from_s, "First simulation time; default: the begin").type_name("S");
+  line.option("--to-s", to_s, "Last simulation time; default: the end").type_name("S");
+}
+
 void add_set(CommandLine& line, std::vector<std::string>& target) {
   line.option("--set", target, "Override a key of the file, e.g. --set thermal.steps=90")
       .repeatable()

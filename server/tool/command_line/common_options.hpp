@@ -25,6 +25,8 @@ void add_scenario(CommandLine& line, ScenarioChoice& target, const std::string& 
 /// (invalid_argument): it is out of range; the message names the option.
 [[nodiscard]] physics::Result<std::optional<std::int64_t>> sim_time_ns(
     std::string_view option, std::optional<double> time_s);
+/// --from-s and --to-s: the range of simulation time that is exported.
+void add_time_range(CommandLine& line, std::optional<double>& from_s, std::optional<double>& to_s);
 /// --gpu N.
 void add_gpu(CommandLine& line, int& target);
 /// --png-of QUANTITY: what the colours of a PNG stand for. `surface`: the frames carry temperatures

@@ -307,9 +307,7 @@ int run_export_frames(const ExportFramesOptions& command) {
 void add_export_frames_options(CommandLine& line, ExportFramesOptions& options) {
   line.path("log", options.log, "MCAP log with images (emit record --with-frames)").required();
   line.output_folder("--out", options.out, "Folder for frame_NNNNNN.exr").required();
-  line.option("--from-s", options.from_s, "First simulation time; default: the begin")
-      .type_name("S");
-  line.option("--to-s", options.to_s, "Last simulation time; default: the end").type_name("S");
+  add_time_range(line, options.from_s, options.to_s);
   line.option("--run-id", options.run_id,
               "Run to export; needed where several runs have images in the range")
       .type_name("N");

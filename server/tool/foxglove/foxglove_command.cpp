@@ -71,9 +71,7 @@ void add_options(CommandLine& line, ExportFoxgloveOptions& options) {
       .type_name("WHICH")
       .one_of({"both", "values", "preview", "none"})
       .show_default();
-  line.option("--from-s", options.from_s, "First simulation time; default: the begin")
-      .type_name("S");
-  line.option("--to-s", options.to_s, "Last simulation time; default: the end").type_name("S");
+  add_time_range(line, options.from_s, options.to_s);
   line.option("--run-id", options.run_id,
               "Run to export; needed where several runs have frames in the range")
       .type_name("N");

@@ -286,6 +286,7 @@ class Exporter {
       if (protocol::from_proto(entry.host_frame(), host_) == protocol::DecodeStatus::ok) {
         return host(host_);
       }
+      ++unreadable_;
       return {};
     }
     return entry.has_frame() ? frame(entry.frame()) : Result<void>{};
@@ -331,6 +332,8 @@ class Exporter {
   }
 
   [[nodiscard]] std::uint64_t without_camera() const noexcept { return without_camera_; }
+  /// Returns how many host frames and poses hold numbers that are none, and were left out.
+  [[nodiscard]] std::uint64_t unreadable() const noexcept { return unreadable_; }
 
  private:
   /// Returns the stamp of an instant, or nothing outside the range, and writes the events that
@@ -386,11 +389,14 @@ class Exporter {
     if (done && looks_.empty()) {
       if (const auto pose = pose_of(decision.sensor_pose())) {
         done = file_.transform(kTransformTopic, **stamp, "camera", sensor_axes(*pose));
+      } else {
+        ++unreadable_;
       }
     }
     for (const v1::EntityState& state : decision.entities()) {
       if (!done) return done;
       const auto pose = pose_of(state.pose());
+      if (state.has_pose() && !pose) ++unreadable_;
       done = entity(**stamp, state.entity_id(), !state.off(),
                     state.has_pose() && pose ? &*pose : nullptr);
     }
@@ -449,6 +455,7 @@ class Exporter {
   std::map<std::uint32_t, bool> shown_;  // by entity
   std::set<std::uint32_t> described_;
   std::uint64_t without_camera_ = 0;
+  std::uint64_t unreadable_ = 0;
 };
 
 /// Reads host frames and journal entries of the chosen run.
@@ -565,6 +572,11 @@ Result<FoxgloveSummary> export_foxglove(const fs::path& log, const fs::path& out
         fmt::format("{} images have no calibration: they are mirrored, rotated or distorted, or "
                     "their field of view is not known",
                     exporter.without_camera()));
+  }
+  if (exporter.unreadable() > 0) {
+    summary.notes.push_back(fmt::format(
+        "{} host frames and poses of the journal were left out: their numbers are out of range",
+        exporter.unreadable()));
   }
   summary.topics = file->topics();
   return summary;

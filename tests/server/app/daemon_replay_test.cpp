@@ -268,6 +268,16 @@ INSTANTIATE_TEST_SUITE_P(Pacing, DaemonReplay,
                                                                                     : "Trigger";
                          });
 
+/// Plays every entry of a journal.
+void play_all(JournalPlayer& player, const std::string& journal) {
+  auto log = protocol::LogReader::open(journal);
+  ASSERT_TRUE(log.has_value()) << log.error().text;
+  for (auto more = log->next(); more && *more; more = log->next()) {
+    const auto frame = player.apply(log->journal());
+    ASSERT_TRUE(frame.has_value()) << frame.error().text;
+  }
+}
+
 /// Cameras with fields of view, places and rates of their own, gimbals and a zoom: every image has
 /// the same bits again, and clients get the headers of their own camera.
 TEST(DaemonReplayOfCameras, EveryImageHasTheSameBits) {
@@ -333,12 +343,7 @@ TEST(DaemonReplayOfCameras, EveryImageHasTheSameBits) {
   SourceScript script;
   ScriptedSource source(script, 32, 16, 7);
   JournalPlayer player(source, *make_channels(scenario, source.info()));
-  auto log = protocol::LogReader::open(journal);
-  ASSERT_TRUE(log.has_value()) << log.error().text;
-  for (auto more = log->next(); more && *more; more = log->next()) {
-    const auto frame = player.apply(log->journal());
-    ASSERT_TRUE(frame.has_value()) << frame.error().text;
-  }
+  ASSERT_NO_FATAL_FAILURE(play_all(player, journal));
   EXPECT_EQ(player.frames(), 20U);
   EXPECT_EQ(player.mismatches(), 0U);
   ASSERT_EQ(script.submitted.size(), 20U + 20U + 7U);
@@ -400,12 +405,7 @@ TEST(DaemonReplayOfCameras, ThatLookAheadHaveTheSameBits) {
   SourceScript script;
   ScriptedSource source(script, 32, 16, 7);
   JournalPlayer player(source, *make_channels(scenario, source.info()));
-  auto log = protocol::LogReader::open(journal);
-  ASSERT_TRUE(log.has_value()) << log.error().text;
-  for (auto more = log->next(); more && *more; more = log->next()) {
-    const auto frame = player.apply(log->journal());
-    ASSERT_TRUE(frame.has_value()) << frame.error().text;
-  }
+  ASSERT_NO_FATAL_FAILURE(play_all(player, journal));
   EXPECT_GT(player.frames(), 20U);
   EXPECT_EQ(player.mismatches(), 0U);
   ASSERT_EQ(script.submitted.size(), live_script.submitted.size());

@@ -3,6 +3,7 @@
 #include <poll.h>
 #include <sys/socket.h>
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <random>
@@ -115,6 +116,7 @@ class Rig {
     frame.image.pictures[0] = view.radiance_w_m2_sr[0];
     frame.image.crc32c[0] = protocol::crc32c(std::as_bytes(view.radiance_w_m2_sr[0]));
     frame.header.frame_number = number_;
+    if (edit) edit(frame);
     EXPECT_TRUE(context_.published.push(frame));
     return true;
   }
@@ -142,6 +144,8 @@ class Rig {
   test::SourceScript& script() { return script_; }
   Sender& sender() { return sender_; }
 
+  std::function<void(PublishFrame&)> edit;  ///< what the next frames have besides their pixels
+
  private:
   test::FakeClock clock_;
   test::SourceScript script_;
@@ -153,6 +157,59 @@ class Rig {
   std::uint32_t next_connection_ = 1;
   std::uint64_t number_ = 0;
 };
+
+TEST(Sender, AChannelThatLooksAheadHasTheInstantAndTheShiftOfItsImages) {
+  Rig rig;
+  Channel& channel = rig.context().channels.front();
+  channel.kind = scene::ChannelKind::projector;
+  channel.look_ahead_frames = 1;
+  channel.output_steps = protocol::kOutputShifted;
+  rig.edit = [](PublishFrame& frame) {
+    frame.header.sim_time_ns = 1'000;
+    frame.header.display_ns = 5'000;
+    frame.header.flags = protocol::kFlagHold;
+    frame.header.shift_x_px = 9.0F;
+    frame.image.shift_px = {8.0F, 8.0F};
+    frame.image.ahead = {.sim_time_ns = 11'000,
+                         .display_ns = 15'000,
+                         .flags = protocol::kFlagExtrapolated,
+                         .wanted_shift_px = {1.5F, -2.0F},
+                         .shift_px = {1.25F, -2.0F}};
+  };
+  Rig::Peer* peer = rig.connect();
+  ASSERT_TRUE(rig.publish());
+  rig.settle({peer});
+  ASSERT_EQ(peer->frames.size(), 1U);
+  const protocol::FrameHeader& ahead = peer->frames[0];
+  EXPECT_EQ(ahead.sim_time_ns, 11'000);
+  EXPECT_EQ(ahead.display_ns, 15'000);
+  EXPECT_EQ(ahead.flags, protocol::kFlagHold | protocol::kFlagExtrapolated);
+  EXPECT_EQ(ahead.applied_shift_x_px, 1.25F);
+  EXPECT_EQ(ahead.shift_x_px, 0.25F) << "what is left to be done";
+  EXPECT_EQ(ahead.shift_y_px, 0.0F);
+  // The same frame on a channel of its own instant.
+  channel.look_ahead_frames = 0;
+  ASSERT_TRUE(rig.publish());
+  rig.settle({peer});
+  ASSERT_EQ(peer->frames.size(), 2U);
+  EXPECT_EQ(peer->frames[1].sim_time_ns, 1'000);
+  EXPECT_EQ(peer->frames[1].display_ns, 5'000);
+  EXPECT_EQ(peer->frames[1].flags, std::uint32_t{protocol::kFlagHold});
+  EXPECT_EQ(peer->frames[1].applied_shift_x_px, 8.0F);
+}
+
+TEST(Sender, APictureThatItsShiftCutsIsFlagged) {
+  Rig rig;
+  Rig::Peer* peer = rig.connect();
+  for (const bool cut : {true, false}) {
+    rig.edit = [cut](PublishFrame& frame) { frame.image.cut[0] = cut; };
+    ASSERT_TRUE(rig.publish());
+    rig.settle({peer});
+  }
+  ASSERT_EQ(peer->frames.size(), 2U);
+  EXPECT_EQ(peer->frames[0].flags, std::uint32_t{protocol::kFlagMotionFault});
+  EXPECT_EQ(peer->frames[1].flags, 0U);
+}
 
 TEST(Sender, AStoppedClientDelaysNobodyAndItsGapIsFlagged) {
   Rig rig;
