@@ -4,7 +4,7 @@
 # of the pages and of the site. Broken ones are printed with file and line and fail the command.
 # Usage: docs.sh [--out DIR] [--check-sources]
 # --out DIR: folder of the site, build/site by default; it is replaced. Open its index.html, or serve the folder.
-# --check-sources: checks the links of the pages alone, and needs Python alone.
+# --check-sources: checks the links of the pages and the navigation alone, and needs Python alone.
 # The reference of commands comes from the program itself: EMIT_BIN names its folder, or build/*/bin has it.
 set -euo pipefail
 cd "$(dirname "$0")/../.."

@@ -257,6 +257,16 @@ def in_navigation(text):
     return re.findall(r"^ +- [^:\n]+: (\S+\.md)$", text.split("\nnav:\n", 1)[1], re.MULTILINE)
 
 
+def navigation_faults(pages):
+    """Yields the pages that the navigation lacks, and its entries without a page."""
+    listed = set(in_navigation((SITE / "mkdocs.yml").read_text(encoding="utf-8")))
+    expected = set(pages) | {"reference/commands.md", "reference/metrics.md"}
+    for path in sorted(expected - listed):
+        yield f"deploy/site/mkdocs.yml: the navigation lacks {path}"
+    for path in sorted(listed - expected):
+        yield f"deploy/site/mkdocs.yml: {path} does not exist"
+
+
 def build(out, emit, pages, files):
     work = out.with_name(out.name + ".work")
     shutil.rmtree(work, ignore_errors=True)
@@ -268,16 +278,6 @@ def build(out, emit, pages, files):
     staging.write("reference/metrics.md", for_mkdocs(metrics_page()))
     shutil.copytree(SITE / "theme", work / "theme")
     (work / "mkdocs.yml").write_text(settings, encoding="utf-8")
-
-    faults = []
-    listed = in_navigation(settings)
-    for path in sorted((set(pages) | {"reference/commands.md", "reference/metrics.md"}) - set(listed)):
-        faults.append(f"deploy/site/mkdocs.yml: the navigation lacks {path}")
-    for path in sorted(set(listed)):
-        if not (work / "pages" / path).exists():
-            faults.append(f"deploy/site/mkdocs.yml: {path} does not exist")
-    if faults:
-        return faults
 
     shutil.rmtree(out, ignore_errors=True)
     # Pages that only links reach are not in the navigation, which mkdocs tells as information.
@@ -304,7 +304,7 @@ def main():
     options = parser.parse_args()
     files = repository_files()
     pages = {path: Page(path) for path in files if path.endswith(".md")}
-    faults = list(broken_links(pages, files))
+    faults = list(broken_links(pages, files)) + list(navigation_faults(pages))
     if not faults and not options.check_sources:
         faults = build(options.out.resolve(), options.emit, pages, files)
     for fault in faults:
