@@ -13,7 +13,7 @@ build_tools=(g++ cmake ninja-build pkg-config git ca-certificates)
 libraries=(libepoxy-dev libegl-dev libglfw3-dev libglm-dev libtinygltf-dev libstb-dev
            libopenexr-dev libboost-dev libprotobuf-dev protobuf-compiler libspdlog-dev libfmt-dev
            libtomlplusplus-dev libcli11-dev libexpected-dev libembree-dev libtbb-dev libeigen3-dev
-           libceres-dev libmeshoptimizer-dev libisal-dev liblz4-dev libssl-dev libgtest-dev libgmock-dev
+           libceres-dev libmeshoptimizer-dev libgeos-dev libisal-dev liblz4-dev libssl-dev libgtest-dev libgmock-dev
            python3-protobuf python3-numpy node-typescript)
 runtime=(libegl-mesa0 libgl1-mesa-dri xvfb xauth)
 checkers=(clang-format clang-tidy clang libclang-rt-dev python3 tshark chromium python3-websockets)

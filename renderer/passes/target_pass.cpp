@@ -82,6 +82,8 @@ void TargetPass::prepare(std::span<const TargetWindow> windows, const ViewVolume
     // Let the pixels of the frame be the samples of the tile.
     gpu::FrameParams& params = frames_[t].params;
     params = frame;
+    params.sun_radius_px = 0.0F;  // samples that miss the target do not count
+    params.moon_radius_px = 0.0F;
     params.rendered_px = kBufferSamples;
     params.rendered_plane_px = kPlaneSamples;
     params.rendered_window_px = tile;

@@ -14,9 +14,11 @@
 #include "budget/ladder_survey.hpp"
 #include "budget/quality_ladder.hpp"
 #include "draw/image_window.hpp"
+#include "draw/sky_bodies.hpp"
 #include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
 #include "emit/physics/limits.hpp"
+#include "emit/physics/sky/moon.hpp"
 #include "emit/scene/mesh.hpp"
 #include "emit/scene/rain.hpp"
 #include "emit/scene/sheets.hpp"
@@ -530,7 +532,12 @@ void GlRenderer::prepare(const FrameRequest& request, const QualityLevel& level)
   frame_params_.sun_up = sun_up ? 1.0F : 0.0F;
   const double sensor_m = scenario_.place.height_m + request.sensor_pose.position_world_m.z;
   frame_params_.sensor_height_m = static_cast<float>(sensor_m);
-  bands_.update(stage_->forcing_now(), sun, sensor_m);
+  const physics::MoonPosition moon = physics::moon_position(
+      scenario_.epoch_utc_ns + request.thermal_time_ns,
+      {physics::Radians(scenario_.place.lat_rad), physics::Radians(scenario_.place.lon_rad),
+       physics::Metres(scenario_.place.height_m)});
+  set_sky_bodies(sun, moon, frame_params_);
+  bands_.update(stage_->forcing_now(), sun, moon, sensor_m);
   if (passes_.targets) passes_.targets->prepare(targets, camera.view, frame_params_);
   if (gas_) prepare_gas(request);
   upload_frame();
@@ -571,6 +578,7 @@ std::vector<RadianceTerms> GlRenderer::radiance_terms(const FrameView& view, con
   seen.range_m = view.depth_m[i] * glm::length(ray);
   seen.sin_elevation = glm::dot(up, ray) / glm::length(ray);
   seen.sensor_height_m = frame_params_.sensor_height_m;
+  seen.bodies = sky_bodies_at(glm::ivec2(px), frame_params_);
   seen.normal = {view.normal[0][i], view.normal[1][i], view.normal[2][i]};
   seen.to_viewer = -glm::normalize(glm::mat3(frame_params_.relworld_from_sensor) * ray);
   seen.to_sun = frame_params_.to_sun;
@@ -593,7 +601,7 @@ std::vector<RadianceTerms> GlRenderer::radiance_terms(const FrameView& view, con
     for (double* part :
          {&terms.emission_w_m2_sr, &terms.sky_w_m2_sr, &terms.neighbours_w_m2_sr,
           &terms.sun_w_m2_sr, &terms.lobe_sky_w_m2_sr, &terms.lobe_neighbours_w_m2_sr,
-          &terms.glint_w_m2_sr, &terms.path_w_m2_sr}) {
+          &terms.glint_w_m2_sr, &terms.path_w_m2_sr, &terms.bodies_w_m2_sr}) {
       *part *= terms.gas_frac;
     }
   }

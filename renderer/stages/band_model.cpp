@@ -252,6 +252,7 @@ BandModel::Instant BandModel::instant_of(const physics::Forcing& forcing,
   now.sky = physics::sky_state(forcing.longwave_down_w_m2, forcing.air_k, dew_point_k_,
                                forcing.cloud_frac, cloud_base_);
   now.air_k = forcing.air_k;
+  now.cloud_frac = forcing.cloud_frac;
   now.environment_k = forcing.environment_k;
   // The direct sun is weaker than a clear one by what clouds and haze take from the beam.
   now.air_mass = physics::relative_air_mass(sun.elevation);
@@ -312,8 +313,35 @@ void BandModel::light_at(const physics::Forcing& forcing, const physics::SunPosi
   for (std::size_t i = 0; i < entries_.size(); ++i) light_of(entries_[i], now, out[i]);
 }
 
+void BandModel::update_bodies(const Entry& entry, const Instant& now,
+                              const physics::MoonPosition& moon, double sensor_m,
+                              gpu::BandParams& params) const noexcept {
+  // The built-in air is looked up by pixel; other air is taken towards the middle of the disc.
+  const auto through = [&](const glm::dvec3& towards) {
+    if (entry.view) return 1.0;
+    if (towards.z <= 0.0) return 0.0;
+    if (entry.air) return entry.air->out(towards.z).transmittance_frac;
+    return std::pow(entry.vertical_transmittance_frac,
+                    physics::relative_air_mass(physics::Radians(std::asin(towards.z))));
+  };
+  const bool above_clouds = sensor_m >= place_m_ + now.sky.cloud_base_m;
+  const double cover_frac = entry.has_sky && !above_clouds ? now.sky.cloud_cover_frac : 0.0;
+  const double beam_frac = !above_clouds ? now.beam_frac
+                           : now.cloud_frac < 1.0 && now.beam_frac > 0.0
+                               ? now.beam_frac / (1.0 - now.cloud_frac)
+                               : 1.0;
+  const double sine = std::sin(physics::kSunSemiAngleRad);
+  params.sun_disc_w_m2_sr =
+      static_cast<float>(entry.sun_outside_w_m2 * beam_frac * through({0.0, 0.0, now.sin_sun}) /
+                         (physics::kPi * sine * sine));
+  params.moon_through_frac = static_cast<float>((1.0 - cover_frac) * through(moon.direction_enu));
+  params.moon_reflected_w_m2_sr =
+      static_cast<float>((1.0 - physics::kMoonEmissivityFrac) * entry.sun_outside_w_m2 /
+                         (moon.sun_au * moon.sun_au) / physics::kPi);
+}
+
 void BandModel::update(const physics::Forcing& forcing, const physics::SunPosition& sun,
-                       double sensor_m) noexcept {
+                       const physics::MoonPosition& moon, double sensor_m) noexcept {
   const Instant now = instant_of(forcing, sun);
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     const Entry& entry = entries_[i];
@@ -336,6 +364,7 @@ void BandModel::update(const physics::Forcing& forcing, const physics::SunPositi
         static_cast<float>((1.0 - cover_frac) * black(now.air_k + now.sky.warmer_k));
     params.cloud_radiance_w_m2_sr = static_cast<float>(cover_frac * cloud_w_m2_sr);
     params.clear_sky_frac = static_cast<float>(1.0 - cover_frac);
+    update_bodies(entry, now, moon, sensor_m, params);
     if (lobes_) update_lobe_sky(i, now);
     if (!entry.view) continue;
     entry.view->at(sensor_m,
@@ -427,9 +456,13 @@ RadianceTerms BandModel::terms(std::size_t band, const Seen& seen,
   RadianceTerms out;
   if (!seen.surface) {
     const float clouds = params.cloud_radiance_w_m2_sr;
+    double sun_through_frac = 1.0;
+    double moon_through_frac = params.moon_through_frac;
     if (entry.view) {
-      out.path_w_m2_sr =
-          physics::air_sky(air_nodes_of(band), seen.sin_elevation).path_radiance_w_m2_sr;
+      const physics::AirSight sky = physics::air_sky(air_nodes_of(band), seen.sin_elevation);
+      out.path_w_m2_sr = sky.path_radiance_w_m2_sr;
+      moon_through_frac *= sky.transmittance_frac[0];
+      sun_through_frac = sky.transmittance_frac[2];
     } else if (entry.air) {
       out.path_w_m2_sr =
           params.clear_sky_frac * entry.air->out(seen.sin_elevation).path_radiance_w_m2_sr + clouds;
@@ -439,6 +472,18 @@ RadianceTerms BandModel::terms(std::size_t band, const Seen& seen,
       out.path_w_m2_sr = params.sky_air_radiance_w_m2_sr *
                              (1.0 - std::pow(entry.vertical_transmittance_frac, mass)) +
                          clouds;
+    }
+    out.bodies_w_m2_sr = seen.bodies.sun_frac * sun_through_frac * params.sun_disc_w_m2_sr;
+    if (seen.bodies.moon_frac > 0.0F) {
+      double sum = 0.0;
+      double weights = 0.0;
+      for (std::size_t p = 0; p < SkyBodies::kPoints; ++p) {
+        sum += seen.bodies.moon_weight[p] *
+               (physics::kMoonEmissivityFrac * black_w_m2_sr(band, seen.bodies.moon_k[p]) +
+                seen.bodies.moon_cosine[p] * params.moon_reflected_w_m2_sr);
+        weights += seen.bodies.moon_weight[p];
+      }
+      out.bodies_w_m2_sr += seen.bodies.moon_frac * moon_through_frac * sum / weights;
     }
     return out;
   }

@@ -4,12 +4,14 @@
 #include <span>
 #include <vector>
 
+#include "draw/sky_bodies.hpp"
 #include "emit/physics/air_view.hpp"
 #include "emit/physics/apparent_temperature.hpp"
 #include "emit/physics/atmosphere_table.hpp"
 #include "emit/physics/band_radiance_lut.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/physics/planck.hpp"
+#include "emit/physics/sky/moon.hpp"
 #include "emit/physics/sky_state.hpp"
 #include "emit/physics/weather.hpp"
 #include "emit/renderer/renderer.hpp"
@@ -33,7 +35,7 @@ class BandModel final : public BandLights {
   /// Sets air, surroundings and sun to the instant of the frame. `sensor_m` is the height of the
   /// camera above sea level.
   void update(const physics::Forcing& forcing, const physics::SunPosition& sun,
-              double sensor_m) noexcept;
+              const physics::MoonPosition& moon, double sensor_m) noexcept;
 
   [[nodiscard]] std::size_t bands() const noexcept override { return entries_.size(); }
   void light_at(const physics::Forcing& forcing, const physics::SunPosition& sun,
@@ -73,6 +75,7 @@ class BandModel final : public BandLights {
     float range_m = 0.0F;
     float sin_elevation = 0.0F;    ///< of the line of sight
     float sensor_height_m = 0.0F;  ///< above sea level
+    SkyBodies bodies;              ///< of a pixel of the sky
     // Glossy surfaces only: unit vectors, relworld, and FrameView::glint_per_sr.
     glm::vec3 normal{0.0F, 0.0F, 1.0F};
     glm::vec3 to_viewer{0.0F, 0.0F, 1.0F};
@@ -145,6 +148,7 @@ class BandModel final : public BandLights {
     double air_k = 0.0;
     double environment_k = 0.0;
     double air_mass = 0.0;
+    double cloud_frac = 0.0;
     double beam_frac = 0.0;  ///< direct sun over that of a clear sky
     double sin_sun = 0.0;
     double sin_shown = 0.0;  ///< of the apparent elevation
@@ -155,6 +159,9 @@ class BandModel final : public BandLights {
   /// Air of the place against that of the climate at sea level; 0 without built-in air.
   [[nodiscard]] double warmer_k(const Entry& entry, const Instant& now) const noexcept;
   [[nodiscard]] double sky_warmer_k(const Entry& entry, const Instant& now) const noexcept;
+  /// Sets the radiance of the discs of sun and moon in a band.
+  void update_bodies(const Entry& entry, const Instant& now, const physics::MoonPosition& moon,
+                     double sensor_m, gpu::BandParams& params) const noexcept;
   void light_of(const Entry& entry, const Instant& now, BandLight& out) const noexcept;
   /// Sets the sky of a band as lobes see it.
   void update_lobe_sky(std::size_t band, const Instant& now) noexcept;

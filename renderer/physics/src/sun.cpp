@@ -3,15 +3,14 @@
 
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
 #include <span>
+
+#include "celestial.hpp"
 
 namespace emit::physics {
 namespace {
 
-constexpr double kArcsec = kDegree / 3600.0;
-constexpr double kAstronomicalUnitM = 149597870700.0;
-constexpr double kJ2000 = 2451545.0;
-constexpr double kPosixEpochJd = 2440587.5;
 constexpr std::int64_t kNsPerDay = 86400LL * 1000000000LL;
 
 /// One term amplitude * cos(phase + rate * t), with t in Julian millennia from J2000.
@@ -116,32 +115,6 @@ double sum(std::span<const Term> terms, double t) noexcept {
   return total * 1e-8;
 }
 
-double wrap(double angle_rad) noexcept {
-  const double turns = angle_rad / (2.0 * kPi);
-  return (turns - std::floor(turns)) * 2.0 * kPi;
-}
-
-struct Nutation {
-  double longitude_rad;
-  double obliquity_rad;
-};
-
-/// Sums the five largest terms of the IAU 1980 series; the rest adds up to under 0.3 arcseconds.
-Nutation nutation(double centuries) noexcept {
-  const double node = (125.04452 - 1934.136261 * centuries) * kDegree;
-  const double sun = (280.4665 + 36000.7698 * centuries) * kDegree;
-  const double moon = (218.3165 + 481267.8813 * centuries) * kDegree;
-  const double sun_anomaly = (357.52772 + 35999.050340 * centuries) * kDegree;
-  const double moon_anomaly = (134.96298 + 477198.867398 * centuries) * kDegree;
-  return {(-17.1996 * std::sin(node) - 1.3187 * std::sin(2.0 * sun) -
-           0.2274 * std::sin(2.0 * moon) + 0.2062 * std::sin(2.0 * node) +
-           0.1426 * std::sin(sun_anomaly) + 0.0712 * std::sin(moon_anomaly)) *
-              kArcsec,
-          (9.2025 * std::cos(node) + 0.5736 * std::cos(2.0 * sun) + 0.0977 * std::cos(2.0 * moon) -
-           0.0895 * std::cos(2.0 * node)) *
-              kArcsec};
-}
-
 }  // namespace
 
 double julian_day_0h(int year, int month, int day) noexcept {
@@ -184,86 +157,43 @@ double delta_t_s(double decimal_year) noexcept {
   return 69.2 + 0.45 * (y - 2030.0);
 }
 
-SunPosition sun_position_ut1(double julian_day, double day_fraction, double tt_minus_ut1_s,
-                             const GeoPlace& place) noexcept {
-  const double ut1_days = (julian_day - kJ2000) + day_fraction;
-  const double tt_days = ut1_days + tt_minus_ut1_s / 86400.0;
-  const double centuries = tt_days / 36525.0;
-  const double millennia = centuries / 10.0;
-
+SunEcliptic sun_ecliptic(const EarthAttitude& earth) noexcept {
   // Sum the heliocentric position of the earth; the geocentric sun lies in the opposite direction.
-  const double t = millennia;
+  const double t = earth.centuries / 10.0;
   const double earth_longitude =
       sum(kL0, t) + t * (sum(kL1, t) + t * (sum(kL2, t) + t * (sum(kL3, t) + t * sum(kL4, t))));
   const double earth_latitude = sum(kB0, t) + t * sum(kB1, t);
   const double distance_au = sum(kR0, t) + t * sum(kR1, t);
-
-  const Nutation nut = nutation(centuries);
   // Correct to FK5, and for nutation in longitude and aberration. Aberration includes the light's
   // travel time.
-  const double longitude = earth_longitude + kPi - 0.09033 * kArcsec + nut.longitude_rad -
-                           20.4898 * kArcsec / distance_au;
-  const double latitude = -earth_latitude;
-  const double obliquity =
-      (84381.448 + centuries * (-46.8150 + centuries * (-0.00059 + centuries * 0.001813))) *
-          kArcsec +
-      nut.obliquity_rad;
+  return {earth_longitude + kPi - 0.09033 * kArcsec + earth.nutation_rad -
+              20.4898 * kArcsec / distance_au,
+          -earth_latitude, distance_au};
+}
 
-  // Turn the ecliptic direction to the equator of date.
-  const glm::dvec3 ecliptic(std::cos(latitude) * std::cos(longitude),
-                            std::cos(latitude) * std::sin(longitude), std::sin(latitude));
-  const double se = std::sin(obliquity);
-  const double ce = std::cos(obliquity);
-  const glm::dvec3 equatorial(ecliptic.x, ce * ecliptic.y - se * ecliptic.z,
-                              se * ecliptic.y + ce * ecliptic.z);
-
-  // Compute Greenwich apparent sidereal time. The fraction of the day goes in last, because it
-  // carries the significant bits.
-  const double ut1_centuries = ut1_days / 36525.0;
-  const double whole = std::floor(ut1_days);
-  const double sidereal_deg =
-      280.46061837 + 360.0 * (ut1_days - whole) + 0.98564736629 * ut1_days +
-      ut1_centuries * ut1_centuries * (0.000387933 - ut1_centuries / 38710000.0);
-  const double sidereal = wrap(sidereal_deg * kDegree + nut.longitude_rad * std::cos(obliquity));
-
+SunPosition sun_position_ut1(double julian_day, double day_fraction, double tt_minus_ut1_s,
+                             const GeoPlace& place) noexcept {
+  const EarthAttitude earth = earth_attitude({julian_day, day_fraction}, tt_minus_ut1_s);
+  const SunEcliptic sun = sun_ecliptic(earth);
   // Turn to the earth-fixed frame and subtract the observer's position, which gives the parallax.
-  const double ss = std::sin(sidereal);
-  const double cs = std::cos(sidereal);
-  const glm::dvec3 sun_ecef_m = distance_au * kAstronomicalUnitM *
-                                glm::dvec3(cs * equatorial.x + ss * equatorial.y,
-                                           -ss * equatorial.x + cs * equatorial.y, equatorial.z);
-  const double slat = std::sin(place.latitude.value());
-  const double clat = std::cos(place.latitude.value());
-  const double slon = std::sin(place.longitude.value());
-  const double clon = std::cos(place.longitude.value());
+  const glm::dvec3 sun_ecef_m =
+      sun.distance_au * kAstronomicalUnitM *
+      ecef_from_ecliptic(earth, ecliptic_direction(sun.longitude_rad, sun.latitude_rad));
   const glm::dvec3 to_sun_m = sun_ecef_m - ecef_m(place);
   const double range_m = glm::length(to_sun_m);
-  const glm::dvec3 d = to_sun_m / range_m;
 
-  // Turn to east-north-up at the place.
   SunPosition result;
-  result.direction_enu = glm::normalize(
-      glm::dvec3(-slon * d.x + clon * d.y, -slat * clon * d.x - slat * slon * d.y + clat * d.z,
-                 clat * clon * d.x + clat * slon * d.y + slat * d.z));
+  result.direction_enu = glm::normalize(glm::transpose(ecef_from_enu(place)) * to_sun_m);
   const glm::dvec3& enu = result.direction_enu;
-  result.azimuth = Radians(wrap(std::atan2(enu.x, enu.y)));
+  result.azimuth = Radians(wrapped_turn(std::atan2(enu.x, enu.y)));
   result.elevation = Radians(std::atan2(enu.z, std::hypot(enu.x, enu.y)));
   result.distance_au = range_m / kAstronomicalUnitM;
   return result;
 }
 
 SunPosition sun_position(std::int64_t posix_utc_ns, const GeoPlace& place) noexcept {
-  // Divide with floor, which keeps the fraction in [0, 1) before 1970 as well.
-  std::int64_t days = posix_utc_ns / kNsPerDay;
-  std::int64_t rest_ns = posix_utc_ns % kNsPerDay;
-  if (rest_ns < 0) {
-    rest_ns += kNsPerDay;
-    --days;
-  }
-  const double year = 1970.0 + static_cast<double>(days) / 365.2425;
-  return sun_position_ut1(kPosixEpochJd + static_cast<double>(days),
-                          static_cast<double>(rest_ns) / static_cast<double>(kNsPerDay),
-                          delta_t_s(year), place);
+  const JulianDate date = julian_date(posix_utc_ns);
+  return sun_position_ut1(date.day, date.fraction, delta_t_s(decimal_year(posix_utc_ns)), place);
 }
 
 double mean_solar_hours(std::int64_t posix_utc_ns, Radians longitude) noexcept {

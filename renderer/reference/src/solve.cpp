@@ -19,6 +19,7 @@
 #include "emit/reference/visibility.hpp"
 #include "emit/scene/base.hpp"
 #include "emit/threads/parallel.hpp"
+#include "sky_discs.hpp"
 #include "solve_checkpoint.hpp"
 #include "solve_points.hpp"
 #include "solve_radiance.hpp"
@@ -386,6 +387,10 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
   const physics::SkyState sky_now = sky_by_bisection(now.longwave_down_w_m2, now.air_k, dew_point_k,
                                                      cloud_frac, scenario.clear_sky.cloud_base);
   const double sensor_m = view.sensor_pose.position_world_m.z;
+  SkyDiscs discs{sun, physics::moon_position(scenario.epoch_utc_ns + view.sim_time_ns, place),
+                 beam_frac};
+  // Above the clouds the sun is that of a clear sky.
+  if (sensor_m >= sky_now.cloud_base_m && cloud_frac < 1.0) discs.beam_frac /= 1.0 - cloud_frac;
   std::vector<double> face_k;
   if (solid) {
     face_k.resize(solid->solver().faces().size());
@@ -442,7 +447,8 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
     // Fill the pixels of the sky.
     for (std::size_t p = 0; p < sky_rays.size(); ++p) {
       if (sky_rays[p] == glm::dvec3(0.0)) continue;
-      plane[p] = static_cast<float>(band.sky(sensor_m, sky_rays[p].z));
+      plane[p] = static_cast<float>(band.sky(sensor_m, sky_rays[p].z) +
+                                    discs.radiance_w_m2_sr(band, view, p));
     }
   }
 }

@@ -9,6 +9,7 @@
 
 #include "emit/physics/clear_sky.hpp"
 #include "emit/physics/constants.hpp"
+#include "emit/physics/sky/moon.hpp"
 
 namespace emit::reference {
 namespace {
@@ -261,6 +262,34 @@ double BandRadiance::sky(double sensor_m, double sin_elevation) const {
     clear_w_m2_sr = sky_air_ * (1.0 - std::pow(vertical_frac_, air_mass(sin_elevation)));
   }
   return (1.0 - cover) * clear_w_m2_sr + cover * cloud_;
+}
+
+double BandRadiance::to_space(double sensor_m, double sin_elevation,
+                              physics::AirSource source) const {
+  if (column_) {
+    const double elevation_rad = std::asin(std::clamp(sin_elevation, -1.0, 1.0));
+    return air_terms_->transmittance(
+        physics::AirPath::to_space(*column_, place_m_ + sensor_m, elevation_rad), source);
+  }
+  if (table_) return table_->out(sin_elevation).transmittance_frac;
+  return has_air_ ? std::pow(vertical_frac_, air_mass(sin_elevation)) : 1.0;
+}
+
+double BandRadiance::sun_disc(double beam_frac, double sensor_m, double sin_elevation) const {
+  const double solid_angle_cosine_sr =
+      physics::kPi * std::pow(std::sin(physics::kSunSemiAngleRad), 2);
+  return sun_outside_w_m2_ * beam_frac / solid_angle_cosine_sr *
+         to_space(sensor_m, sin_elevation, physics::AirSource::sun_lowtran);
+}
+
+double BandRadiance::moon(double kelvin, double sun_cosine, double sun_au, double sensor_m,
+                          double sin_elevation) const {
+  const double clear =
+      has_air_ && sensor_m < sky_now_.cloud_base_m ? 1.0 - sky_now_.cloud_cover_frac : 1.0;
+  const double sunlight = sun_outside_w_m2_ / (sun_au * sun_au) * sun_cosine;
+  return clear * to_space(sensor_m, sin_elevation, physics::AirSource::black_300k) *
+         (physics::kMoonEmissivityFrac * black(kelvin) +
+          (1.0 - physics::kMoonEmissivityFrac) * sunlight / physics::kPi);
 }
 
 }  // namespace emit::reference

@@ -57,6 +57,13 @@ class BandRadiance {
   /// Returns the mean of the sky's radiance over the part before a face, weighted with the cosine
   /// to its normal, W m-2 sr-1. `normal_up` is the vertical component of the unit normal.
   [[nodiscard]] double sky_mean(double normal_up) const noexcept;
+  /// Returns the radiance of the sun's disc as seen from a height above the world's origin, at a
+  /// sine of the elevation, W m-2 sr-1. `beam_frac` is the share of a clear sky's sun that shines.
+  [[nodiscard]] double sun_disc(double beam_frac, double sensor_m, double sin_elevation) const;
+  /// Returns the radiance of the moon where its ground has a temperature and the sun stands at an
+  /// angle from its zenith, W m-2 sr-1.
+  [[nodiscard]] double moon(double kelvin, double sun_cosine, double sun_au, double sensor_m,
+                            double sin_elevation) const;
   /// Irradiance of the sun in the band, across its direction, W m-2.
   [[nodiscard]] double sun_w_m2() const noexcept { return sun_w_m2_; }
   /// Radiance that leaves a surface, W m-2 sr-1.
@@ -92,6 +99,9 @@ class BandRadiance {
   double air_ = 0.0;
   static constexpr std::size_t kTiltSteps = 90;
   std::array<double, kTiltSteps + 1> sky_means_{};  ///< by tilt, every 2 degrees
+  /// Transmittance from a height above the world's origin to space.
+  [[nodiscard]] double to_space(double sensor_m, double sin_elevation,
+                                physics::AirSource source) const;
   double sun_w_m2_ = 0.0;
   double sun_outside_w_m2_ = 0.0;  ///< at 1 au
 };

@@ -53,7 +53,7 @@ struct StoredMesh {
 /// Converts each glTF mesh at most once per skin and handedness, when a node first asks for it.
 class MeshStore {
  public:
-  MeshStore(const GltfFile& file, GltfModel& model) : file_(file), model_(model) {}
+  MeshStore(const GltfFile& file, GltfModel& model) : file_(file), model_(model), cut_outs_(file) {}
 
   /// @param skin  -1: the node has none
   /// Errors of convert_mesh() and read_skin().
@@ -99,7 +99,7 @@ class MeshStore {
       pose->gltf_from_node = gltf_from_node;
     }
     Result<ConvertedMesh> converted =
-        convert_mesh(file_, mesh, pose ? &*pose : nullptr, model_.warnings);
+        convert_mesh(file_, mesh, pose ? &*pose : nullptr, cut_outs_, model_.warnings);
     if (!converted) return tl::unexpected(std::move(converted.error()));
     slot.converted = std::move(*converted);
     model_.dropped_triangles += slot.converted.dropped_triangles;
@@ -108,6 +108,7 @@ class MeshStore {
 
   const GltfFile& file_;
   GltfModel& model_;
+  CutOuts cut_outs_;
   std::map<std::pair<int, int>, Slot> slots_;  ///< by mesh and skin
   std::vector<glm::dmat4> nodes_;              ///< transforms of all nodes, once a skin asks
 };
@@ -227,26 +228,19 @@ void warn_of_materials(const GltfFile& file, GltfModel& model) {
     }
   }
   std::vector<std::string> textured;
-  std::vector<std::string> cut_out;
   std::vector<std::string> blended;
   for (std::size_t i = 0; i < in_use.size(); ++i) {
     if (!in_use[i]) continue;
     const tinygltf::Material& material = file.model.materials[i];
     const std::string name = "'" + model.materials[i].name + "'";
     if (has_texture(material)) textured.push_back(name);
-    if (material.alphaMode == "MASK") cut_out.push_back(name);
     if (material.alphaMode == "BLEND") blended.push_back(name);
   }
   if (!textured.empty()) {
     model.warnings.push_back(
-        fmt::format("{}: textures are not read: the surface of material {} has one set of "
-                    "properties, whatever its images show",
+        fmt::format("{}: textures only cut out what alphaMode MASK says: the surface of material "
+                    "{} has one set of properties, whatever its images show",
                     file.name, list_of(textured)));
-  }
-  if (!cut_out.empty()) {
-    model.warnings.push_back(fmt::format(
-        "{}: alphaMode MASK of material {} is ignored: what its image cuts out is taken as solid",
-        file.name, list_of(cut_out)));
   }
   if (!blended.empty()) {
     model.warnings.push_back(

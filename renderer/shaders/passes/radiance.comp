@@ -23,6 +23,7 @@ layout(std430, binding = EMIT_BIND_STATS) buffer Stats { FrameStatsGpu stats; };
 
 #define EMIT_PLANCK_LUT(index) texelFetch(band_lut, index).r
 #include "lib/planck_lut.glsl"
+#include "lib/sky_disc.glsl"
 // The tables of the air lie in the same buffer, behind those of the bands.
 #define EMIT_ATMOSPHERE_TABLE(index) texelFetch(band_lut, index).r
 #include "lib/atmosphere_table.glsl"
@@ -221,6 +222,32 @@ float through_air_w_m2_sr(vec4 sight, vec2 leaving, float temperature_k, float r
          air_view_path_w_m2_sr(sight, range_m);
 }
 
+// Radiance of the sun's disc in a pixel, of which it covers a share. `sight` is the node of the line of sight.
+float sun_disc_w_m2_sr(uint band, vec4 sight, float cover_frac) {
+  float through = (EMIT_AIR_MODEL >> band & 1u) != 0u ? exp(-sight.z) : 1.0;
+  return cover_frac * through * bands[band].sun_disc_w_m2_sr;
+}
+
+// The same of the moon, whose middle lies at `centre` from that of the pixel.
+float moon_disc_w_m2_sr(uint band, vec4 sight, vec2 centre, float cover_frac) {
+  vec4 lut = vec4(bands[band].lut_first_k, bands[band].lut_nodes_per_k, bands[band].lut_last_node,
+                  float(band * frame.band_lut_nodes));
+  float sum = 0.0;
+  float weights = 0.0;
+  bool below_table = false;  // by night the moon is darker than the table; it is the table's first node there
+  for (int i = 0; i < EMIT_DISC_POINTS; ++i) {
+    vec3 point = disc_point(i, centre, frame.moon_radius_px);
+    vec3 normal = vec3(point.xy, sqrt(max(1.0 - dot(point.xy, point.xy), 0.0)));
+    float cosine = max(dot(normal, frame.moon_to_sun), 0.0);
+    float temperature_k = max(EMIT_MOON_SUBSOLAR_K * inversesqrt(frame.moon_sun_au) * sqrt(sqrt(cosine)), 100.0);
+    sum += point.z * (EMIT_MOON_EMISSIVITY * planck_lut_radiance_w_m2_sr(temperature_k, lut, below_table) +
+                      cosine * bands[band].moon_reflected_w_m2_sr);
+    weights += point.z;
+  }
+  float through = (EMIT_AIR_MODEL >> band & 1u) != 0u ? exp(-sight.x) : 1.0;
+  return cover_frac * through * bands[band].moon_through_frac * sum / weights;
+}
+
 // Computes and writes all planes of one pixel.
 void write_pixel(ivec2 px) {
   // Leave pixels outside the window.
@@ -247,6 +274,16 @@ void write_pixel(ivec2 px) {
   vec2 tilt = sky_tilt_place(lobe.block != 0 ? lobe.normal.z : 1.0);
 #endif
 
+  // Find the shares of a pixel of the sky that sun and moon cover. They are rarely in view.
+  float sun_frac = 0.0;
+  float moon_frac = 0.0;
+  vec2 moon_centre = frame.moon_at_px - vec2(px) - 0.5;
+  if (!surface && frame.moon_radius_px > 0.0) moon_frac = disc_cover_frac(moon_centre, frame.moon_radius_px);
+  if (!surface && frame.sun_radius_px > 0.0) {
+    // The moon hides the sun.
+    sun_frac = disc_cover_frac(frame.sun_at_px - vec2(px) - 0.5, frame.sun_radius_px) * (1.0 - moon_frac);
+  }
+
   // Compute the radiance of each band. Where both sides are cheap the code selects and does not branch, because
   // software rasterisers run both sides of a branch anyway.
   for (uint i = 0u; i < EMIT_BANDS; ++i) {
@@ -257,8 +294,9 @@ void write_pixel(ivec2 px) {
 #endif
     clamped = clamped || (surface && off_table);
     float radiance_w_m2_sr = surface ? leaving.x + leaving.y : 0.0;
+    vec4 sight = vec4(0.0);
     if ((EMIT_AIR_MODEL >> i & 1u) != 0u) {
-      vec4 sight = air_view_node(int(bands[i].air_view_first), air_place);
+      sight = air_view_node(int(bands[i].air_view_first), air_place);
       float seen_w_m2_sr = through_air_w_m2_sr(sight, leaving, seen.temperature_k, range_m);
       radiance_w_m2_sr = surface ? seen_w_m2_sr : sight.w;
     } else if ((EMIT_AIR_TABLE >> i & 1u) != 0u) {
@@ -274,6 +312,8 @@ void write_pixel(ivec2 px) {
         radiance_w_m2_sr = sky_radiance_w_m2_sr(i, sin_elevation);
       }
     }
+    if (sun_frac > 0.0) radiance_w_m2_sr += sun_disc_w_m2_sr(i, sight, sun_frac);
+    if (moon_frac > 0.0) radiance_w_m2_sr += moon_disc_w_m2_sr(i, sight, moon_centre, moon_frac);
     bool finite = !(isnan(radiance_w_m2_sr) || isinf(radiance_w_m2_sr));
     nonfinite = nonfinite || !finite;
     planes[i * plane_px + pixel] = finite ? radiance_w_m2_sr : 0.0;

@@ -110,6 +110,8 @@
 
 // Boresight distance that the geometry buffer holds for a pixel without a surface.
 #define EMIT_SKY_DEPTH_M 1e30f
+#define EMIT_MOON_SUBSOLAR_K 394.0f  // physics::kMoonSubsolarK
+#define EMIT_MOON_EMISSIVITY 0.95f   // physics::kMoonEmissivityFrac
 
 // Bits of EMIT_OUTPUTS, which passes/radiance.comp is compiled with.
 #define EMIT_OUTPUT_TEMPERATURE 1u

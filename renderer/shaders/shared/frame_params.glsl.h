@@ -33,6 +33,14 @@ struct FrameParams {
   float near_m;               // cached: boresight distance at which the depth buffer holds 1
   vec3 to_sun;                // unit vector towards the sun, relworld
   float sun_up;               // 1: the sun is up; 0: it is not
+  vec2 sun_at_px;             // middle of the sun's disc in the rendered image, in pixels from its corner
+  float sun_radius_px;        // 0: the sun is out of view
+  float moon_radius_px;       // 0: the moon is out of view
+  vec2 moon_at_px;
+  float moon_sun_au;          // distance of the moon from the sun
+  float unused0;
+  vec3 moon_to_sun;           // unit vector: right and down in the image, then towards the camera
+  float unused1;
 };
 
 // Uniform block of one draw: one submesh of one instance.
@@ -173,6 +181,10 @@ struct BandParams {
   float cloud_radiance_w_m2_sr;         // of the clouds, times their cover
   float clear_sky_frac;                 // share of the sky without clouds
   uint unused1;
+  float sun_disc_w_m2_sr;               // radiance of the sun: outside the air if that is built in, else as seen
+  float moon_through_frac;              // share of the moon's light that clouds leave, and other air than the built-in one
+  float moon_reflected_w_m2_sr;         // sunlight that the moon sends from where the sun stands in the zenith
+  float unused2;
   vec4 sky_by_tilt_w_m2_sr[EMIT_SKY_TILT_VEC4];  // mean of the sky that a face sees, see lib/sky_tilt.glsl
 };
 
@@ -182,7 +194,7 @@ struct FrameStatsGpu {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(FrameParams) == 192);
+static_assert(sizeof(FrameParams) == 240);
 EMIT_SHARED_OFFSET(FrameParams, ray_per_px, 64);
 EMIT_SHARED_OFFSET(FrameParams, rendered_px, 80);
 EMIT_SHARED_OFFSET(FrameParams, output_px, 96);
@@ -192,6 +204,8 @@ EMIT_SHARED_OFFSET(FrameParams, obscurance_radius_m, 144);
 EMIT_SHARED_OFFSET(FrameParams, band_lut_nodes, 160);
 EMIT_SHARED_OFFSET(FrameParams, to_sun, 176);
 EMIT_SHARED_OFFSET(FrameParams, sun_up, 188);
+EMIT_SHARED_OFFSET(FrameParams, moon_at_px, 208);
+EMIT_SHARED_OFFSET(FrameParams, moon_to_sun, 224);
 static_assert(sizeof(DrawParams) == 192);
 EMIT_SHARED_OFFSET(DrawParams, material, 112);
 EMIT_SHARED_OFFSET(DrawParams, tile_row, 128);
@@ -222,12 +236,13 @@ EMIT_SHARED_OFFSET(StepParams, moist_end, 80 * EMIT_MAX_CASCADES + 208);
 EMIT_SHARED_OFFSET(StepParams, air_start_offset_k, 80 * EMIT_MAX_CASCADES + 224);
 EMIT_SHARED_OFFSET(StepParams, cascade_count, 80 * EMIT_MAX_CASCADES + 240);
 static_assert(sizeof(RelaxationParams) == 32);
-static_assert(sizeof(BandParams) == 96 + 16 * EMIT_SKY_TILT_VEC4);
+static_assert(sizeof(BandParams) == 112 + 16 * EMIT_SKY_TILT_VEC4);
 EMIT_SHARED_OFFSET(BandParams, air_radiance_w_m2_sr, 32);
 EMIT_SHARED_OFFSET(BandParams, sun_irradiance_w_m2, 48);
 EMIT_SHARED_OFFSET(BandParams, air_table_first, 64);
 EMIT_SHARED_OFFSET(BandParams, sky_air_radiance_w_m2_sr, 80);
-EMIT_SHARED_OFFSET(BandParams, sky_by_tilt_w_m2_sr, 96);
+EMIT_SHARED_OFFSET(BandParams, sun_disc_w_m2_sr, 96);
+EMIT_SHARED_OFFSET(BandParams, sky_by_tilt_w_m2_sr, 112);
 static_assert(sizeof(FrameStatsGpu) == 16);
 #endif
 

@@ -536,8 +536,8 @@ TEST(GltfMaterials, what_is_not_shown_is_said) {
   text.nodes = R"({"mesh":0},{"mesh":1,"translation":[0,0,1]},{"mesh":2,"translation":[0,0,2]})";
   text.scenes = R"({"nodes":[0,1,2]})";
   const std::vector<std::string> warnings = load(text).warnings;
-  EXPECT_THAT(warnings,
-              Contains(AllOf(HasSubstr("MASK"), HasSubstr("'leaf'"), HasSubstr("solid"))));
+  EXPECT_THAT(warnings, Contains(AllOf(HasSubstr("MASK"), HasSubstr("'leaf'"), HasSubstr("solid"),
+                                       HasSubstr("nowhere.png"))));
   EXPECT_THAT(warnings, Contains(AllOf(HasSubstr("BLEND"), HasSubstr("'glass'"))));
   EXPECT_THAT(warnings, Contains(AllOf(HasSubstr("textures"), HasSubstr("'leaf'"))));
   EXPECT_THAT(warnings, Contains(AllOf(HasSubstr("vertex colours"), HasSubstr("mesh 0 'part'"))));

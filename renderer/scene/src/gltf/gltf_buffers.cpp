@@ -135,7 +135,42 @@ Result<Bytes> load_buffer(std::string_view text,
   return bytes;
 }
 
+Result<Bytes> bytes_of_view(const tinygltf::Model& model, std::uint64_t index) {
+  if (index >= model.bufferViews.size()) {
+    return make_error(ErrorCode::parse, fmt::format("bufferView {} does not exist", index));
+  }
+  const tinygltf::BufferView& view = model.bufferViews[index];
+  if (view.buffer < 0 || static_cast<std::size_t>(view.buffer) >= model.buffers.size()) {
+    return make_error(ErrorCode::parse,
+                      fmt::format("bufferView {}: buffer {} does not exist", index, view.buffer));
+  }
+  const Bytes& data = model.buffers[static_cast<std::size_t>(view.buffer)].data;
+  if (view.byteOffset > data.size() || view.byteLength > data.size() - view.byteOffset) {
+    return make_error(ErrorCode::parse,
+                      fmt::format("bufferView {} exceeds buffer {}", index, view.buffer));
+  }
+  const auto first = data.begin() + static_cast<std::ptrdiff_t>(view.byteOffset);
+  return Bytes(first, first + static_cast<std::ptrdiff_t>(view.byteLength));
+}
+
 }  // namespace
+
+Result<Bytes> image_bytes(const GltfFile& file, int index) {
+  const auto images = json_items(file.images);
+  if (!images || index < 0 || static_cast<std::size_t>(index) >= images->size()) {
+    return make_error(ErrorCode::parse, "it does not exist");
+  }
+  const auto image = json_members((*images)[static_cast<std::size_t>(index)]);
+  if (!image) return make_error(ErrorCode::parse, "not an object");
+  if (const auto view = json_unsigned(json_member(*image, "bufferView"))) {
+    return bytes_of_view(file.model, *view);
+  }
+  const auto uri = json_string(json_member(*image, "uri"));
+  if (!uri) return make_error(ErrorCode::parse, "it has neither uri nor bufferView");
+  if (uri->starts_with("data:")) return decode_data_uri(*uri);
+  const std::filesystem::path parent = file.path.parent_path();
+  return read_external(*uri, parent.empty() ? "." : parent);
+}
 
 Result<Bytes> read_bytes(const std::filesystem::path& path) {
   std::error_code status;

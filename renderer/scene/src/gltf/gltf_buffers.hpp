@@ -21,6 +21,12 @@ namespace emit::scene {
     std::string_view list, std::optional<std::span<const unsigned char>> chunk,
     const std::filesystem::path& folder, tinygltf::Model& model);
 
+/// Encoded bytes of an image: a data URI, a file beside the model or a view of a buffer.
+/// Errors: not_found, io, parse (no such image, malformed), unsupported (a URI that is no local
+/// file). No message holds a data URI.
+[[nodiscard]] physics::Result<std::vector<unsigned char>> image_bytes(const GltfFile& file,
+                                                                      int index);
+
 /// Whole content of a file. Errors: not_found, unsupported (4 GiB and more), io.
 [[nodiscard]] physics::Result<std::vector<unsigned char>> read_bytes(
     const std::filesystem::path& path);

@@ -171,7 +171,7 @@ Result<void> check_extensions(const std::vector<JsonMember>& root) {
 }
 
 /// The text with the arrays `buffers` and `images` emptied: buffers are loaded here, by rules of
-/// their own, and images are not read at all.
+/// their own, and images only where a surface needs them.
 std::string without_sources(std::string_view json, const std::vector<JsonMember>& root) {
   std::string out;
   out.reserve(json.size());
@@ -236,6 +236,7 @@ Result<void> parse_bytes(std::span<const unsigned char> bytes, GltfFile& file) {
   if (auto checked = check_version(*root); !checked) return checked;
   if (auto checked = check_extensions(*root); !checked) return checked;
   if (auto parsed = parse_json(without_sources(json, *root), file.model); !parsed) return parsed;
+  file.images = std::string(json_member(*root, "images"));
   file.model.buffers.clear();
   const std::filesystem::path parent = file.path.parent_path();
   if (auto loaded = load_buffers(json_member(*root, "buffers"), parts.binary,

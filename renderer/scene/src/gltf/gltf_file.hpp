@@ -22,6 +22,7 @@ struct GltfFile {
   std::string name;  ///< file name without folder: begins every message
   tinygltf::Model model;
   std::vector<std::string> warnings;
+  std::string images;  ///< JSON text of the `images` array; empty: the file has none
 };
 
 /// Reads and parses a file.

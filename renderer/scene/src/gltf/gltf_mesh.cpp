@@ -52,8 +52,8 @@ struct RawPrimitive {
   std::vector<std::uint32_t> indices;  ///< whole triangles
   std::uint32_t material = kNoGltfMaterial;
   bool double_sided = false;
-  bool has_indices = false;
-  double max_stored = 0.0;  ///< largest coordinate in the file; 0: stored as whole numbers
+  bool has_indices = false;  ///< false: equal vertices may stand more than once
+  double max_stored = 0.0;   ///< largest coordinate in the file; 0: stored as whole numbers
 };
 
 glm::dvec3 area_vector(const std::vector<glm::vec3>& p, const std::uint32_t* triangle) {
@@ -291,6 +291,23 @@ Result<void> read_geometry(const tinygltf::Model& model, const tinygltf::Primiti
   return {};
 }
 
+/// Coordinates in the image of a mask; empty where the primitive has none of that number.
+Result<std::vector<glm::dvec2>> read_texture_coordinates(const tinygltf::Model& model,
+                                                         const tinygltf::Primitive& primitive,
+                                                         int set) {
+  const std::string name = fmt::format("TEXCOORD_{}", set);
+  const auto found = primitive.attributes.find(name);
+  std::vector<glm::dvec2> uv;
+  if (found == primitive.attributes.end()) return uv;
+  const Result<std::vector<float>> values = read_floats(model, found->second, 2);
+  if (!values) return tl::unexpected(physics::Error(values.error()).with_context(name));
+  uv.reserve(values->size() / 2);
+  for (std::size_t i = 0; i + 1 < values->size(); i += 2) {
+    uv.emplace_back((*values)[i], (*values)[i + 1]);
+  }
+  return uv;
+}
+
 void append(Mesh& mesh, const Soup& soup, std::uint32_t material, bool double_sided) {
   const auto base = static_cast<std::uint32_t>(mesh.positions_m.size());
   const auto first = static_cast<std::uint32_t>(mesh.indices.size());
@@ -311,6 +328,7 @@ constexpr std::size_t kMaxMeshIndices = std::size_t{1} << 31U;
 Result<std::optional<RawPrimitive>> read_primitive(const GltfFile& file,
                                                    const tinygltf::Primitive& primitive,
                                                    const std::string& context, const SkinPose* skin,
+                                                   CutOuts& cut_outs,
                                                    std::vector<std::string>& warnings) {
   const auto warn = [&](const std::string& text) {
     warnings.push_back(fmt::format("{}: {}: {}", file.name, context, text));
@@ -360,6 +378,20 @@ Result<std::optional<RawPrimitive>> read_primitive(const GltfFile& file,
     if (auto checked = check_coordinates(raw.positions); !checked) {
       return tl::unexpected(checked.error());
     }
+  }
+  if (CutOut* cut_out = cut_outs.find(raw.material, warnings)) {
+    const auto uv = read_texture_coordinates(model, primitive, cut_out->mask().tex_coord);
+    if (!uv) return tl::unexpected(uv.error());
+    if (uv->size() != raw.positions.size()) {
+      warn(fmt::format("without TEXCOORD_{}, what its image cuts out is taken as solid",
+                       cut_out->mask().tex_coord));
+      return std::optional<RawPrimitive>{std::move(raw)};
+    }
+    for (const std::string& message :
+         apply_cut_out(*cut_out, *uv, {raw.positions, raw.normals, raw.indices})) {
+      warn(message);
+    }
+    raw.has_indices = false;
   }
   return std::optional<RawPrimitive>{std::move(raw)};
 }
@@ -431,7 +463,7 @@ Result<std::uint64_t> add_primitive(const GltfFile& file, RawPrimitive raw,
 }  // namespace
 
 Result<ConvertedMesh> convert_mesh(const GltfFile& file, int mesh_index, const SkinPose* skin,
-                                   std::vector<std::string>& warnings) {
+                                   CutOuts& cut_outs, std::vector<std::string>& warnings) {
   EMIT_CHECK_OP(static_cast<std::size_t>(mesh_index), <, file.model.meshes.size());
   const tinygltf::Mesh& source = file.model.meshes[static_cast<std::size_t>(mesh_index)];
   ConvertedMesh converted;
@@ -442,7 +474,7 @@ Result<ConvertedMesh> convert_mesh(const GltfFile& file, int mesh_index, const S
   for (std::size_t p = 0; p < source.primitives.size(); ++p) {
     const std::string context = fmt::format("{} primitive {}", mesh_context, p);
     Result<std::optional<RawPrimitive>> raw =
-        read_primitive(file, source.primitives[p], context, skin, warnings);
+        read_primitive(file, source.primitives[p], context, skin, cut_outs, warnings);
     if (!raw) {
       return tl::unexpected(std::move(raw.error()).with_context(context));
     }

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "apply_cut_out.hpp"
 #include "emit/scene/mesh.hpp"
 #include "gltf_file.hpp"
 #include "gltf_skin.hpp"
@@ -24,15 +25,15 @@ struct ConvertedMesh {
   std::uint64_t dropped_triangles = 0;
 };
 
-/// Joins the triangle primitives of one glTF mesh. `warnings` gets a line, begun with the file's
-/// name, for each primitive or part of one that is left out.
+/// Joins the triangle primitives of one glTF mesh, less what alpha masks cut out. `warnings` gets a
+/// line, begun with the file's name, for each primitive or part of one that is left out.
 ///
 /// @param skin  null: the mesh has no skin. Otherwise its vertices come out in the axes of the
 /// scene.
 /// @pre the mesh exists.
 /// Errors name mesh and primitive: parse, unsupported (coordinates beyond 1e9, 2^31 indices).
 [[nodiscard]] physics::Result<ConvertedMesh> convert_mesh(const GltfFile& file, int mesh_index,
-                                                          const SkinPose* skin,
+                                                          const SkinPose* skin, CutOuts& cut_outs,
                                                           std::vector<std::string>& warnings);
 
 /// The mesh mirrored in x, with its winding turned so that fronts stay fronts. A mirroring node

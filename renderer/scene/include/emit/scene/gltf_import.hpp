@@ -14,11 +14,13 @@
 /// the first, else all root nodes), any number of primitives and materials, triangle lists, strips
 /// and fans, 8/16/32-bit and no indices, interleaved, strided, normalised and sparse accessors,
 /// skins in the pose of the file, doubleSided, EXT_mesh_gpu_instancing, KHR_mesh_quantization and
-/// EXT_meshopt_compression. Missing normals are computed flat, as the glTF specification asks.
+/// EXT_meshopt_compression, and surfaces that an alpha mask cuts out (alphaMode MASK, PNG images,
+/// KHR_texture_transform), whose triangles end at the outline of the mask. Missing normals are
+/// computed flat, as the glTF specification asks.
 ///
-/// A warning names points, lines, morph targets, animations, images, vertex colours and alpha
-/// modes, none of which is used. An unknown required extension, another version than 2 and
-/// coordinates beyond 1e9 are errors.
+/// A warning names points, lines, morph targets, animations, other images, vertex colours and
+/// alphaMode BLEND, none of which is used. An unknown required extension, another version than 2
+/// and coordinates beyond 1e9 are errors.
 ///
 /// The import repairs what would otherwise be shown wrong, and warns of it: normals without
 /// direction, normals against the winding, surfaces of two materials in one plane. Vertices far
