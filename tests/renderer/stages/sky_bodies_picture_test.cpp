@@ -10,8 +10,8 @@
 #include "emit/physics/clear_sky.hpp"
 #include "emit/physics/constants.hpp"
 #include "emit/physics/frames.hpp"
-#include "emit/physics/sky/moon.hpp"
 #include "emit/physics/planck.hpp"
+#include "emit/physics/sky/moon.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/reference/solve.hpp"
 #include "emit/scene/mesh.hpp"
@@ -88,7 +88,8 @@ physics::Pose facing(const glm::dvec3& towards) {
 /// Solid angle of a pixel.
 double pixel_sr(const scene::SensorDesc& sensor, std::size_t i) {
   const double per_px = 2.0 * std::tan(0.5 * sensor.fov_h_rad) / sensor.width_px;
-  const double x = (static_cast<double>(i % sensor.width_px) + 0.5 - 0.5 * sensor.width_px) * per_px;
+  const double x =
+      (static_cast<double>(i % sensor.width_px) + 0.5 - 0.5 * sensor.width_px) * per_px;
   const double y =
       (static_cast<double>(i / sensor.width_px) + 0.5 - 0.5 * sensor.height_px) * per_px;
   return per_px * per_px * std::pow(1.0 + x * x + y * y, -1.5);
@@ -97,39 +98,36 @@ double pixel_sr(const scene::SensorDesc& sensor, std::size_t i) {
 TEST(SkyBodies, the_sun_in_the_picture_has_the_light_of_the_sun) {
   for (const auto& [air, fov_deg] : {std::pair{true, 3.0}, std::pair{false, 3.0},
                                      std::pair{false, 40.0}, std::pair{true, 110.0}}) {
-    {
-      SCOPED_TRACE(testing::Message() << (air ? "air " : "no air ") << fov_deg);
-      scene::ScenarioDesc scenario = sky_scenario(air);
-      scenario.sensor.fov_h_rad = fov_deg * physics::kDegree;
-      const std::int64_t at_ns = 4 * 3600 * kNsPerS;
-      const physics::SunPosition sun =
-          physics::sun_position(scenario.epoch_utc_ns + at_ns, place_of(scenario));
-      const Picture with = render(scenario, facing(sun.direction_enu), at_ns);
-      for (std::size_t b = 0; b < 2; ++b) {
-        const auto terms = physics::BandAir::build(scene::spectral_band(scenario.bands[b]));
-        ASSERT_TRUE(terms);
-        double expected = terms->sun_outside_w_m2() / std::pow(sun.distance_au, 2);
-        if (air) {
-          const auto column =
-              physics::AirColumn::build(*scenario.atmosphere.bands[b].model);
-          expected *= terms->transmittance(
-              physics::AirPath::to_space(*column, scenario.place.height_m + 10.0,
-                                         sun.elevation.value()),
-              physics::AirSource::sun_lowtran);
-        }
-        // Take off the sky, which is as bright on both sides.
-        const double disc_px = 0.27 * 96.0 / fov_deg;
-        const auto reach = static_cast<std::size_t>(disc_px) + 2;
-        double sum_w_m2 = 0.0;
-        for (std::size_t y = 40 - reach; y < 40 + reach; ++y) {
-          const float* row = &with.radiance[b][y * scenario.sensor.width_px];
-          const double sky = 0.5 * (row[48 - reach - 1] + row[48 + reach]);
-          for (std::size_t x = 48 - reach; x < 48 + reach; ++x) {
-            sum_w_m2 += (row[x] - sky) * pixel_sr(scenario.sensor, y * 96 + x);
-          }
-        }
-        EXPECT_NEAR(sum_w_m2 / expected, 1.0, 0.01) << scenario.bands[b].name;
+    SCOPED_TRACE(testing::Message() << (air ? "air " : "no air ") << fov_deg);
+    scene::ScenarioDesc scenario = sky_scenario(air);
+    scenario.sensor.fov_h_rad = fov_deg * physics::kDegree;
+    const std::int64_t at_ns = 4 * 3600 * kNsPerS;
+    const physics::SunPosition sun =
+        physics::sun_position(scenario.epoch_utc_ns + at_ns, place_of(scenario));
+    const Picture with = render(scenario, facing(sun.direction_enu), at_ns);
+    for (std::size_t b = 0; b < 2; ++b) {
+      const auto terms = physics::BandAir::build(scene::spectral_band(scenario.bands[b]));
+      ASSERT_TRUE(terms);
+      double expected = terms->sun_outside_w_m2() / std::pow(sun.distance_au, 2);
+      if (air) {
+        const auto column = physics::AirColumn::build(*scenario.atmosphere.bands[b].model);
+        expected *=
+            terms->transmittance(physics::AirPath::to_space(*column, scenario.place.height_m + 10.0,
+                                                            sun.elevation.value()),
+                                 physics::AirSource::sun_lowtran);
       }
+      // Take off the sky, which is as bright on both sides.
+      const double disc_px = 0.27 * 96.0 / fov_deg;
+      const auto reach = static_cast<std::size_t>(disc_px) + 2;
+      double sum_w_m2 = 0.0;
+      for (std::size_t y = 40 - reach; y < 40 + reach; ++y) {
+        const float* row = &with.radiance[b][y * scenario.sensor.width_px];
+        const double sky = 0.5 * (row[48 - reach - 1] + row[48 + reach]);
+        for (std::size_t x = 48 - reach; x < 48 + reach; ++x) {
+          sum_w_m2 += (row[x] - sky) * pixel_sr(scenario.sensor, y * 96 + x);
+        }
+      }
+      EXPECT_NEAR(sum_w_m2 / expected, 1.0, 0.01) << scenario.bands[b].name;
     }
   }
 }
@@ -167,52 +165,50 @@ TEST(SkyBodies, every_pixel_is_that_of_the_reference) {
   for (const auto& [of_moon, fov_deg, has_air] :
        {std::tuple{true, 1.2, true}, std::tuple{false, 30.0, true}, std::tuple{true, 30.0, false},
         std::tuple{false, 1.2, false}}) {
-    {
-      SCOPED_TRACE(testing::Message() << (of_moon ? "moon " : "sun ") << fov_deg);
-      scenario.atmosphere = has_air ? air : scene::AtmosphereDesc{};
-      scenario.atmosphere.enabled = has_air;
-      scenario.sensor.fov_h_rad = fov_deg * physics::kDegree;
-      const physics::Pose pose = facing(of_moon ? moon.direction_enu : sun.direction_enu);
-      std::vector<glm::uvec2> asked;
-      for (std::uint32_t x = 40; x < 56; ++x) asked.push_back({x, 40});
-      const Picture shown = render(scenario, pose, at_ns, asked);
-      const auto geometry = scene::load_scene(scenario);
-      ASSERT_TRUE(geometry);
-      reference::SolveOptions options;
-      options.rays = 4;
-      auto solver = reference::SceneSolver::create(scenario, *geometry, options, at_ns);
-      ASSERT_TRUE(solver) << solver.error().text;
-      const auto truth =
-          solver->image({at_ns, pose, scenario.sensor.width_px, scenario.sensor.height_px,
-                           scenario.sensor.fov_h_rad});
-      ASSERT_TRUE(truth) << truth.error().text;
-      for (std::size_t b = 0; b < 2; ++b) {
-        const auto& own = truth->radiance_w_m2_sr[b];
-        double most = 0.0;
-        for (const float value : own) most = std::max(most, std::isnan(value) ? 0.0 : double{value});
-        double sum = 0.0;
-        double difference = 0.0;
-        for (std::size_t i = 0; i < own.size(); ++i) {
-          if (std::isfinite(shown.depth_m[i])) continue;
-          // A moon of two pixels has few points in each.
-          EXPECT_NEAR(shown.radiance[b][i] / most, own[i] / most, fov_deg > 10.0 ? 0.1 : 0.04) << i;
-          sum += own[i];
-          difference += shown.radiance[b][i] - own[i];
-        }
-        EXPECT_LT(std::abs(difference), 0.02 * sum);
-        for (std::size_t k = 0; k < asked.size(); ++k) {
-          const double pixel = shown.radiance[b][asked[k].y * scenario.sensor.width_px + asked[k].x];
-          EXPECT_NEAR(shown.terms[k][b].sum_w_m2_sr() / pixel, 1.0, 1e-4) << k;
-        }
+    SCOPED_TRACE(testing::Message() << (of_moon ? "moon " : "sun ") << fov_deg);
+    scenario.atmosphere = has_air ? air : scene::AtmosphereDesc{};
+    scenario.atmosphere.enabled = has_air;
+    scenario.sensor.fov_h_rad = fov_deg * physics::kDegree;
+    const physics::Pose pose = facing(of_moon ? moon.direction_enu : sun.direction_enu);
+    std::vector<glm::uvec2> asked;
+    for (std::uint32_t x = 40; x < 56; ++x) asked.push_back({x, 40});
+    const Picture shown = render(scenario, pose, at_ns, asked);
+    const auto geometry = scene::load_scene(scenario);
+    ASSERT_TRUE(geometry);
+    reference::SolveOptions options;
+    options.rays = 4;
+    auto solver = reference::SceneSolver::create(scenario, *geometry, options, at_ns);
+    ASSERT_TRUE(solver) << solver.error().text;
+    const auto truth = solver->image({at_ns, pose, scenario.sensor.width_px,
+                                      scenario.sensor.height_px, scenario.sensor.fov_h_rad});
+    ASSERT_TRUE(truth) << truth.error().text;
+    for (std::size_t b = 0; b < 2; ++b) {
+      const auto& own = truth->radiance_w_m2_sr[b];
+      double most = 0.0;
+      for (const float value : own) most = std::max(most, std::isnan(value) ? 0.0 : double{value});
+      double sum = 0.0;
+      double difference = 0.0;
+      for (std::size_t i = 0; i < own.size(); ++i) {
+        if (std::isfinite(shown.depth_m[i])) continue;
+        // A moon of two pixels has few points in each.
+        EXPECT_NEAR(shown.radiance[b][i] / most, own[i] / most, fov_deg > 10.0 ? 0.1 : 0.04) << i;
+        sum += own[i];
+        difference += shown.radiance[b][i] - own[i];
+      }
+      EXPECT_LT(std::abs(difference), 0.02 * sum);
+      for (std::size_t k = 0; k < asked.size(); ++k) {
+        const double pixel = shown.radiance[b][asked[k].y * scenario.sensor.width_px + asked[k].x];
+        EXPECT_NEAR(shown.terms[k][b].sum_w_m2_sr() / pixel, 1.0, 1e-4) << k;
       }
     }
   }
 }
 
 TEST(SkyBodies, a_full_moon_is_as_hot_as_telescopes_see_it) {
-  // 2014-06-13, 04:11 UT was full moon; half a day later it is near full, above the horizon somewhere.
-  // A ball whose places are in balance with the sun sends as much as (2/3)^(1/4) of 394 K, 356 K, and
-  // a little less in 8-12 um and in June. Telescopes see some 365 K, as the rim is warmer than that.
+  // 2014-06-13, 04:11 UT was full moon; half a day later it is near full, above the horizon
+  // somewhere. A ball whose places are in balance with the sun sends as much as (2/3)^(1/4) of 394
+  // K, 356 K, and a little less in 8-12 um and in June. Telescopes see some 365 K, as the rim is
+  // warmer than that.
   scene::ScenarioDesc scenario = sky_scenario(false);
   scenario.epoch_utc_ns = 1402632660LL * kNsPerS;
   scenario.sensor.fov_h_rad = 0.8 * physics::kDegree;
