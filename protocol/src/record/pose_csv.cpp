@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -25,10 +26,37 @@ using physics::Error;
 using physics::ErrorCode;
 using physics::Result;
 
-enum Column : std::size_t { kTime, kEast, kNorth, kUp, kQw, kQx, kQy, kQz, kFrame, kColumns };
-constexpr std::array<std::string_view, kColumns> kNames{
-    "sim_time_s", "east_m", "north_m", "up_m", "qw", "qx", "qy", "qz", "frame_number"};
+enum Column : std::size_t {
+  kTime,
+  kEast,
+  kNorth,
+  kUp,
+  kQw,
+  kQx,
+  kQy,
+  kQz,
+  kFrame,
+  kFov,
+  kGimbalYaw,
+  kGimbalPitch,
+  kGimbalRoll,
+  kColumns
+};
+constexpr std::array<std::string_view, kColumns> kNames{"sim_time_s",
+                                                        "east_m",
+                                                        "north_m",
+                                                        "up_m",
+                                                        "qw",
+                                                        "qx",
+                                                        "qy",
+                                                        "qz",
+                                                        "frame_number",
+                                                        "fov_h_rad",
+                                                        "gimbal_yaw_rad",
+                                                        "gimbal_pitch_rad",
+                                                        "gimbal_roll_rad"};
 constexpr std::size_t kMandatory = kFrame;
+constexpr std::array<Column, 3> kGimbal{kGimbalYaw, kGimbalPitch, kGimbalRoll};
 
 /// Column of a drive of a part.
 struct PartColumn {
@@ -94,6 +122,15 @@ struct PoseCsvReader::Impl {
         return tl::unexpected(std::move(found.error()));
       }
     }
+    // Two of three angles would leave it open whether the third one is 0 or stays as it is.
+    for (const Column column : kGimbal) {
+      const auto there =
+          std::ranges::find_if(kGimbal, [this](Column other) { return place[other].has_value(); });
+      if (place[column] || there == kGimbal.end()) continue;
+      return fail(csv.header()[*place[*there]],
+                  fmt::format("column '{}' is missing: '{}' comes with all three angles",
+                              kNames[column], kNames[*there]));
+    }
     for (std::size_t i = 0; i < csv.header().size(); ++i) {
       const auto part = part_of_column(csv.header()[i].text);
       if (!part) continue;
@@ -127,6 +164,41 @@ struct PoseCsvReader::Impl {
     if (value) return *value;
     return fail(
         at, fmt::format("column '{}': {}", kNames[column], physics::not_a_number_text(at.text)));
+  }
+
+  tl::unexpected<Error> out_of_range(Column column, const DecodeFault& fault) const {
+    return fail(cell(column),
+                fmt::format("column '{}': {} is out of range, must be {} to {}", kNames[column],
+                            cell(column).text, fault.lowest, fault.highest));
+  }
+  [[nodiscard]] bool is_empty(Column column) const {
+    return !place[column] || cell(column).text.empty();
+  }
+
+  /// Reads field of view and gimbal. Empty cells leave them as they are.
+  Result<void> read_view() {
+    host.fov_h_rad.reset();
+    host.gimbal_rad.reset();
+    DecodeFault fault;
+    if (!is_empty(kFov)) {
+      const auto fov_h_rad = number(kFov);
+      if (!fov_h_rad) return tl::unexpected(fov_h_rad.error());
+      if (check_fov_h(*fov_h_rad, &fault) != DecodeStatus::ok) return out_of_range(kFov, fault);
+      host.fov_h_rad = *fov_h_rad;
+    }
+    if (std::ranges::all_of(kGimbal, [this](Column column) { return is_empty(column); })) return {};
+    glm::dvec3 gimbal_rad{0.0};
+    for (std::size_t i = 0; i < kGimbal.size(); ++i) {
+      const auto angle_rad = number(kGimbal[i]);
+      if (!angle_rad) return tl::unexpected(angle_rad.error());
+      // The angles before this one are in range, so that a fault is that of this one.
+      gimbal_rad[static_cast<glm::length_t>(i)] = *angle_rad;
+      if (check_gimbal(gimbal_rad, &fault) != DecodeStatus::ok) {
+        return out_of_range(kGimbal[i], fault);
+      }
+    }
+    host.gimbal_rad = gimbal_rad;
+    return {};
   }
 
   [[nodiscard]] Result<std::uint64_t> frame_number() const {
@@ -208,6 +280,7 @@ struct PoseCsvReader::Impl {
                       values[kQx], values[kQy], values[kQz], physics::limits::kQuaternionNorm.lo,
                       physics::limits::kQuaternionNorm.hi));
     }
+    if (auto view = read_view(); !view) return view;
     if (auto parts = read_parts(); !parts) return parts;
     host.sim_time_ns = sim_time_ns;
     host.frame_number = *frame;

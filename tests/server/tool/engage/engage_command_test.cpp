@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "support/emit_process.hpp"
+#include "support/peers.hpp"
 
 namespace emit::test {
 namespace {
@@ -159,9 +160,12 @@ TEST(CliEngage, TheTrackerStudyMatchesBestWithThermalShadows) {
 
 /// Returns JSBSim's program; "" where there is none.
 std::string jsbsim_program() {
-  const char* const given = std::getenv("TEST_JSBSIM");
-  const std::string program = given != nullptr ? given : "/usr/games/JSBSim";
-  return std::filesystem::exists(program) ? program : "";
+  if (const char* const given = std::getenv("TEST_JSBSIM")) return given;
+  for (const std::filesystem::path& program :
+       {std::filesystem::path("/usr/games/JSBSim"), peers_folder() / "JSBSim"}) {
+    if (std::filesystem::exists(program)) return program;
+  }
+  return "";
 }
 
 using Vector = std::array<double, 3>;
@@ -200,7 +204,7 @@ Vector rotated(const std::map<std::string, double>& row, const Vector& v) {
 
 TEST(CliEngage, FramesShowThePosesOfJsbsim) {
   const std::string program = jsbsim_program();
-  if (program.empty()) GTEST_SKIP() << "JSBSim is missing: set TEST_JSBSIM";
+  if (program.empty()) GTEST_SKIP() << "JSBSim is missing: install_deps.sh --with-peers brings it";
   if (!has_python()) GTEST_SKIP() << "python3-numpy or python3-protobuf is missing";
   const TemporaryFolder folder;
   const ProcessResult result =
