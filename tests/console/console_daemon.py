@@ -16,8 +16,8 @@ STEP_NS = 5_000_000
 IG_CLOCK = 'mode = "ig-clock"\nrate_hz = 50.0'
 
 
-def start(pacing, address="127.0.0.1:0", more=""):
-    return Daemon(WIDTH_PX, HEIGHT_PX, pacing, more=f'[console]\nlisten = "{address}"\nrate_hz = 20.0\n{more}')
+def start(pacing, address="127.0.0.1:0", more="", head=""):
+    return Daemon(WIDTH_PX, HEIGHT_PX, pacing, more=f'[console]\nlisten = "{address}"\nrate_hz = 20.0\n{more}', head=head)
 
 
 @contextlib.contextmanager
@@ -50,16 +50,21 @@ def swinging_axes(seconds, amplitude_rad, rate_rad_s, delay_s):
 
 
 class CigiRig:
-    """A daemon in lock step with a CIGI host."""
+    """A daemon in lock step with a CIGI host. The channels are those of a scenario, so that they have temperatures."""
 
-    def __init__(self, kind=CigiHost):
+    def __init__(self, kind=CigiHost, display_k=(280, 330)):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             probe.bind(("127.0.0.1", 0))
             listen = probe.getsockname()[1]
         self.host = kind(("127.0.0.1", listen))
         try:
-            self.daemon = start('mode = "host-step"', more=(
-                f'[cigi]\nlisten = "127.0.0.1:{listen}"\nhost = "127.0.0.1:{self.host.port}"\nrate_hz = 200.0\n'))
+            with tempfile.NamedTemporaryFile("w", suffix=".toml") as scenario:
+                scenario.write(f'[sensor]\nwidth_px = {WIDTH_PX}\nheight_px = {HEIGHT_PX}\n[display]\n'
+                               f'min_k = {display_k[0]}\nmax_k = {display_k[1]}\n'
+                               '[[object]]\ngltf = "share:scenes/box.glb"\n')
+                scenario.flush()
+                self.daemon = start('mode = "host-step"', head=f'scenario = "{scenario.name}"\n', more=(
+                    f'[cigi]\nlisten = "127.0.0.1:{listen}"\nhost = "127.0.0.1:{self.host.port}"\nrate_hz = 200.0\n'))
         except BaseException:
             self.host.close()
             raise

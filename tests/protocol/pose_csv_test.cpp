@@ -143,7 +143,7 @@ TEST_F(PoseCsv, ErrorsOfTheViewNameLineAndColumn) {
   EXPECT_THAT(outcome(head + ",0,0,-inf\n"), HasSubstr("column 'gimbal_roll_rad': -inf is out"));
   EXPECT_THAT(outcome(head + ",0,,0\n"), HasSubstr(":2:20: column 'gimbal_pitch_rad': no value"));
   EXPECT_THAT(outcome(poses + ",gimbal_pitch_rad\n"),
-              HasSubstr(":1:36: column 'gimbal_yaw_rad' is missing: 'gimbal_pitch_rad' comes with "
+              HasSubstr(":1:44: column 'gimbal_yaw_rad' is missing: 'gimbal_pitch_rad' comes with "
                         "all three angles"));
   EXPECT_THAT(outcome(poses + ",fov_h_rad,fov_h_rad\n"),
               HasSubstr("column 'fov_h_rad' appears twice"));

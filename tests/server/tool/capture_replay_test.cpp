@@ -162,7 +162,7 @@ TEST_F(CaptureReplay, a_capture_of_the_wire_gives_the_frames_of_the_run) {
 
 /// A table of the host's poses sets zoom and gimbal again where the host has set them.
 TEST_F(CaptureReplay, a_table_of_poses_gives_the_frames_of_the_run_with_zoom_and_gimbal) {
-  std::string world = small_world("cached");
+  std::string world = small_world("per-frame");
   const std::string size = "width_px = 48\n";
   world.insert(world.find(size), "fov_h_deg = 30\nfov_h_min_deg = 5\n");
   folder_.write("world.toml", world);
