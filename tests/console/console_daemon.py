@@ -64,7 +64,7 @@ class CigiRig:
                                '[[object]]\ngltf = "share:scenes/box.glb"\n')
                 scenario.flush()
                 self.daemon = start('mode = "host-step"', head=f'scenario = "{scenario.name}"\n', more=(
-                    f'[cigi]\nlisten = "127.0.0.1:{listen}"\nhost = "127.0.0.1:{self.host.port}"\nrate_hz = 200.0\n'))
+                    f'[cigi]\nlisten = "127.0.0.1:{listen}"\nhost = "127.0.0.1:{self.host.port}"\nrate_hz = 20.0\n'))
         except BaseException:
             self.host.close()
             raise

@@ -128,6 +128,31 @@ TEST_F(PoseCsv, ColumnsOfTheViewSetZoomAndGimbalWhereTheyAreNotEmpty) {
   EXPECT_EQ(reader->host().gimbal_rad, glm::dvec3(3.1415926535897931, 0.0, 0.0));
 }
 
+TEST_F(PoseCsv, ColumnsOfRatesAreThoseOfTheSeekerWhereTheyAreNotEmpty) {
+  const std::string poses = "sim_time_s,east_m,north_m,up_m,qw,qx,qy,qz";
+  const std::string rates =
+      ",velocity_east_m_s,velocity_north_m_s,velocity_up_m_s,rate_x_rad_s,rate_y_rad_s,"
+      "rate_z_rad_s\n";
+  std::ofstream(path_) << poses << rates << "0,0,0,0,1,0,0,0,10,-20.5,30,0.1,-0.2,0.3\n"
+                       << "1,0,0,0,1,0,0,0,,,,,,\n";
+  auto reader = PoseCsvReader::open(path_);
+  ASSERT_TRUE(reader) << reader.error().text;
+  ASSERT_TRUE(reader->next().value());
+  ASSERT_TRUE(reader->host().seeker_rates);
+  EXPECT_EQ(reader->host().seeker_rates->velocity_world_m_s, glm::dvec3(10.0, -20.5, 30.0));
+  EXPECT_EQ(reader->host().seeker_rates->angular_rate_body_rad_s, glm::dvec3(0.1, -0.2, 0.3));
+  ASSERT_TRUE(reader->next().value());
+  EXPECT_FALSE(reader->host().seeker_rates);
+  const std::string row = poses + rates + "0,0,0,0,1,0,0,0,";
+  EXPECT_THAT(outcome(row + "1,2,3,4,,6\n"), HasSubstr(":2:25: column 'rate_y_rad_s': no value"));
+  EXPECT_THAT(outcome(row + "1,2e9,3,4,5,6\n"),
+              HasSubstr(":2:19: column 'velocity_north_m_s': 2e9 is out of range, must be -"));
+  EXPECT_THAT(outcome(row + "1,2,3,4,5,nan\n"), HasSubstr("column 'rate_z_rad_s': nan is out"));
+  EXPECT_THAT(outcome(poses + ",rate_x_rad_s\n"),
+              HasSubstr(":1:44: column 'velocity_east_m_s' is missing: it belongs to "
+                        "'rate_x_rad_s'"));
+}
+
 TEST_F(PoseCsv, ErrorsOfTheViewNameLineAndColumn) {
   const std::string poses = "sim_time_s,east_m,north_m,up_m,qw,qx,qy,qz";
   const std::string head =
@@ -143,8 +168,8 @@ TEST_F(PoseCsv, ErrorsOfTheViewNameLineAndColumn) {
   EXPECT_THAT(outcome(head + ",0,0,-inf\n"), HasSubstr("column 'gimbal_roll_rad': -inf is out"));
   EXPECT_THAT(outcome(head + ",0,,0\n"), HasSubstr(":2:20: column 'gimbal_pitch_rad': no value"));
   EXPECT_THAT(outcome(poses + ",gimbal_pitch_rad\n"),
-              HasSubstr(":1:44: column 'gimbal_yaw_rad' is missing: 'gimbal_pitch_rad' comes with "
-                        "all three angles"));
+              HasSubstr(":1:44: column 'gimbal_yaw_rad' is missing: it belongs to "
+                        "'gimbal_pitch_rad'"));
   EXPECT_THAT(outcome(poses + ",fov_h_rad,fov_h_rad\n"),
               HasSubstr("column 'fov_h_rad' appears twice"));
 }

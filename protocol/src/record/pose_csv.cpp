@@ -8,6 +8,7 @@
 #include <charconv>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -40,6 +41,12 @@ enum Column : std::size_t {
   kGimbalYaw,
   kGimbalPitch,
   kGimbalRoll,
+  kVelocityEast,
+  kVelocityNorth,
+  kVelocityUp,
+  kRateX,
+  kRateY,
+  kRateZ,
   kColumns
 };
 constexpr std::array<std::string_view, kColumns> kNames{"sim_time_s",
@@ -54,9 +61,16 @@ constexpr std::array<std::string_view, kColumns> kNames{"sim_time_s",
                                                         "fov_h_rad",
                                                         "gimbal_yaw_rad",
                                                         "gimbal_pitch_rad",
-                                                        "gimbal_roll_rad"};
+                                                        "gimbal_roll_rad",
+                                                        "velocity_east_m_s",
+                                                        "velocity_north_m_s",
+                                                        "velocity_up_m_s",
+                                                        "rate_x_rad_s",
+                                                        "rate_y_rad_s",
+                                                        "rate_z_rad_s"};
 constexpr std::size_t kMandatory = kFrame;
-constexpr std::array<Column, 3> kGimbal{kGimbalYaw, kGimbalPitch, kGimbalRoll};
+constexpr std::array kGimbal{kGimbalYaw, kGimbalPitch, kGimbalRoll};
+constexpr std::array kRates{kVelocityEast, kVelocityNorth, kVelocityUp, kRateX, kRateY, kRateZ};
 
 /// Column of a drive of a part.
 struct PartColumn {
@@ -122,15 +136,8 @@ struct PoseCsvReader::Impl {
         return tl::unexpected(std::move(found.error()));
       }
     }
-    // Two of three angles would leave it open whether the third one is 0 or stays as it is.
-    for (const Column column : kGimbal) {
-      const auto there =
-          std::ranges::find_if(kGimbal, [this](Column other) { return place[other].has_value(); });
-      if (place[column] || there == kGimbal.end()) continue;
-      return fail(csv.header()[*place[*there]],
-                  fmt::format("column '{}' is missing: '{}' comes with all three angles",
-                              kNames[column], kNames[*there]));
-    }
+    if (auto whole = check_group(kGimbal); !whole) return whole;
+    if (auto whole = check_group(kRates); !whole) return whole;
     for (std::size_t i = 0; i < csv.header().size(); ++i) {
       const auto part = part_of_column(csv.header()[i].text);
       if (!part) continue;
@@ -142,6 +149,19 @@ struct PoseCsvReader::Impl {
                                                  csv.header()[i].text));
       }
       part_columns.push_back({i, *part});
+    }
+    return {};
+  }
+  /// Refuses a part of a group. Two of three angles would leave it open whether the third one is 0
+  /// or stays as it is.
+  [[nodiscard]] Result<void> check_group(std::span<const Column> group) const {
+    const auto there = std::ranges::find_if(group, [this](Column c) { return bool(place[c]); });
+    if (there == group.end()) return {};
+    for (const Column column : group) {
+      if (place[column]) continue;
+      return fail(csv.header()[*place[*there]],
+                  fmt::format("column '{}' is missing: it belongs to '{}'", kNames[column],
+                              kNames[*there]));
     }
     return {};
   }
@@ -174,6 +194,9 @@ struct PoseCsvReader::Impl {
   [[nodiscard]] bool is_empty(Column column) const {
     return !place[column] || cell(column).text.empty();
   }
+  [[nodiscard]] bool all_empty(std::span<const Column> group) const {
+    return std::ranges::all_of(group, [this](Column column) { return is_empty(column); });
+  }
 
   /// Reads field of view and gimbal. Empty cells leave them as they are.
   Result<void> read_view() {
@@ -186,7 +209,7 @@ struct PoseCsvReader::Impl {
       if (check_fov_h(*fov_h_rad, &fault) != DecodeStatus::ok) return out_of_range(kFov, fault);
       host.fov_h_rad = *fov_h_rad;
     }
-    if (std::ranges::all_of(kGimbal, [this](Column column) { return is_empty(column); })) return {};
+    if (all_empty(kGimbal)) return {};
     glm::dvec3 gimbal_rad{0.0};
     for (std::size_t i = 0; i < kGimbal.size(); ++i) {
       const auto angle_rad = number(kGimbal[i]);
@@ -199,6 +222,21 @@ struct PoseCsvReader::Impl {
     }
     host.gimbal_rad = gimbal_rad;
     return {};
+  }
+
+  /// Reads the rates of the seeker. Empty cells mean that the host does not know them.
+  Result<std::optional<PoseRates>> read_rates() {
+    if (all_empty(kRates)) return std::optional<PoseRates>();
+    PoseRates rates;
+    for (std::size_t i = 0; i < kRates.size(); ++i) {
+      const auto value = number(kRates[i]);
+      if (!value) return tl::unexpected(value.error());
+      const auto axis = static_cast<glm::length_t>(i % 3);
+      (i < 3 ? rates.velocity_world_m_s : rates.angular_rate_body_rad_s)[axis] = *value;
+      DecodeFault fault;
+      if (check_pose({}, rates, &fault) != DecodeStatus::ok) return out_of_range(kRates[i], fault);
+    }
+    return rates;
   }
 
   [[nodiscard]] Result<std::uint64_t> frame_number() const {
@@ -269,8 +307,10 @@ struct PoseCsvReader::Impl {
     // Apply the same rules as to a pose from the wire.
     const physics::Pose pose{{values[kEast], values[kNorth], values[kUp]},
                              {values[kQw], values[kQx], values[kQy], values[kQz]}};
+    const auto rates = read_rates();
+    if (!rates) return tl::unexpected(rates.error());
     v1::Pose message;
-    to_proto(pose, std::nullopt, message);
+    to_proto(pose, *rates, message);
     if (from_proto(message, host.seeker, host.seeker_rates) != DecodeStatus::ok) {
       return fail(
           csv.row()[0],

@@ -336,6 +336,25 @@ TEST_F(TableFollowerTest, a_swing_beyond_the_travel_is_a_limit_and_stays_within_
   EXPECT_TRUE(limited);
 }
 
+TEST_F(TableFollowerTest, a_demand_beyond_the_travel_is_a_limit_before_the_axes_follow_too) {
+  swing_rad_ = 0.5;
+  bool limited = false;
+  const auto look = [&](std::int64_t for_ns) {
+    for (std::int64_t ran_ns = 0; ran_ns < for_ns; ran_ns += 10 * kMs) {
+      run(10 * kMs);
+      limited = limited || (follower_->status().state == MotionState::capturing &&
+                            (follower_->status().faults & protocol::kMotionLimit) != 0);
+    }
+  };
+  look(300 * kMs);
+  EXPECT_FALSE(limited) << "the axes are under way";
+  ASSERT_EQ(follower_->status().state, MotionState::capturing);
+  // The swing leaves the travel of 2 rad before the axes have met their demands.
+  swing_rad_ = 4.0;
+  look(500 * kMs);
+  EXPECT_TRUE(limited);
+}
+
 TEST_F(TableFollowerTest, a_full_circle_beyond_the_travel_comes_back_softly_at_its_other_end) {
   set_off();
   turning_ = true;

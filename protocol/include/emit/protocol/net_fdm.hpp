@@ -67,8 +67,8 @@ struct Fault {
 /// Reads a datagram. `state` is written only when the fault is of kind none.
 [[nodiscard]] Fault decode(std::span<const std::byte> datagram, State& state) noexcept;
 
-/// Writes a datagram of version 24 whose other fields are 0, for tests and tools. Velocities and accelerations
-/// are rounded to float32.
+/// Writes a datagram of version 24 whose other fields are 0, for tests and tools. Velocities and
+/// accelerations are rounded to float32.
 void encode(const State& state, std::span<std::byte, kBytes> datagram) noexcept;
 
 /// Returns the rates about the body's x, y and z axes that the rates of the angles make:
