@@ -19,7 +19,8 @@ namespace emit::test {
 namespace {
 
 using ::testing::HasSubstr;
-constexpr std::chrono::seconds kEngageLimit{280};
+/// A flight and a study take minutes where other tests run beside them.
+constexpr std::chrono::seconds kEngageLimit{880};
 
 /// The scene is coarse, its history is short, and the image is a part of the usual one, which keeps
 /// llvmpipe quick.
