@@ -17,7 +17,8 @@ IG_CLOCK = 'mode = "ig-clock"\nrate_hz = 50.0'
 
 
 def start(pacing, address="127.0.0.1:0", more="", head=""):
-    return Daemon(WIDTH_PX, HEIGHT_PX, pacing, more=f'[console]\nlisten = "{address}"\nrate_hz = 20.0\n{more}', head=head)
+    return Daemon(WIDTH_PX, HEIGHT_PX, pacing, head=head,
+                  more=f'[console]\nlisten = "{address}"\nrate_hz = 20.0\n{more}')
 
 
 @contextlib.contextmanager
