@@ -106,7 +106,9 @@ class Console(unittest.TestCase):
             end_s = time.monotonic() + PATIENCE_S
             while not self.page.evaluate(f"{SHOWN} > 0 && emitConsole.showsKelvins"):
                 self.assertLess(time.monotonic(), end_s, "no image came")
-                rig.step()
+                # The page may be slow to ask for an image, and one comes only with a further frame.
+                for _ in range(5):
+                    rig.step()
             limits = "[emitConsole.low, emitConsole.high]"
             button = "document.querySelector('#auto').textContent"
             self.assertEqual(self.page.evaluate(button), "Auto")
