@@ -4,7 +4,7 @@
 # Uses sudo when not root. Prints what it installs; installs nothing that is already there.
 # Usage: install_deps.sh [--with-checkers] [--with-yardsticks] [--with-docs] [--with-peers]: what checks the source tree
 # and reads its messages in tests; what `emit bench stream` is put beside; what builds the documentation site (11 MB);
-# other programs that tests put emitd's files and messages before. Packages for Node.js among them go to
+# other programs that tests put emitd's files and messages before. Packages for Node.js among them, and JSBSim, go to
 # $EMIT_PEERS_DIR, or to the folder emit/peers of the user's cache. Tests look there, and are skipped where a peer is
 # missing.
 set -euo pipefail
@@ -74,5 +74,17 @@ if $with_peers; then
     echo "install_deps: installing ${absent[*]} in $peers_folder"
     mkdir -p "$peers_folder"
     npm install --prefix "$peers_folder" --no-audit --no-fund --ignore-scripts "${absent[@]}"
+  fi
+  # FlightGear brings JSBSim. Its package depends on 1.8 GB of scenery that the program does not need.
+  if [[ -x /usr/games/JSBSim || -x $peers_folder/JSBSim ]]; then
+    echo "install_deps: JSBSim is present"
+  else
+    echo "install_deps: taking JSBSim from Debian's package flightgear (11 MB) to $peers_folder"
+    mkdir -p "$peers_folder"
+    unpacked=$(mktemp -d)
+    trap 'rm -rf "$unpacked"' EXIT
+    (cd "$unpacked" && apt-get download -q flightgear)
+    dpkg-deb --fsys-tarfile "$unpacked"/flightgear_*.deb | tar -x -C "$unpacked" ./usr/games/JSBSim
+    mv "$unpacked/usr/games/JSBSim" "$peers_folder/JSBSim"
   fi
 fi

@@ -353,6 +353,25 @@ DecodeStatus from_proto(const v1::PartCommand& in, PartCommandData& out,
   return check_part(out, fault);
 }
 
+DecodeStatus check_gimbal(const glm::dvec3& gimbal_rad, DecodeFault* fault) noexcept {
+  RangeCheck check(fault);
+  if (check.in_range({"gimbal.yaw_rad", "gimbal.pitch_rad", "gimbal.roll_rad"}, gimbal_rad,
+                     physics::kPi)) {
+    return DecodeStatus::ok;
+  }
+  set_part(fault, DecodeFault::Part::seeker);
+  return DecodeStatus::invalid_pose;
+}
+
+DecodeStatus check_fov_h(double fov_h_rad, DecodeFault* fault) noexcept {
+  // The scenario's own range, which is narrower, is checked where the frame is used.
+  constexpr limits::Interval kFovRad{limits::kFieldOfViewDeg.lo * physics::kDegree,
+                                     limits::kFieldOfViewDeg.hi * physics::kDegree};
+  RangeCheck check(fault);
+  return check.in_range("fov_h_rad", fov_h_rad, kFovRad) ? DecodeStatus::ok
+                                                         : DecodeStatus::invalid_view;
+}
+
 DecodeStatus from_proto(const v1::HostFrame& in, HostFrameData& out, DecodeFault* fault) noexcept {
   out.frame_number = in.frame_number();
   out.sim_time_ns = in.sim_time_ns();
@@ -396,18 +415,15 @@ DecodeStatus from_proto(const v1::HostFrame& in, HostFrameData& out, DecodeFault
   if (in.has_gimbal()) {
     const v1::Gimbal& gimbal = in.gimbal();
     out.gimbal_rad = glm::dvec3(gimbal.yaw_rad(), gimbal.pitch_rad(), gimbal.roll_rad());
-    if (!check.in_range({"gimbal.yaw_rad", "gimbal.pitch_rad", "gimbal.roll_rad"}, *out.gimbal_rad,
-                        physics::kPi)) {
-      set_part(fault, DecodeFault::Part::seeker);
-      return DecodeStatus::invalid_pose;
+    if (auto status = check_gimbal(*out.gimbal_rad, fault); status != DecodeStatus::ok) {
+      return status;
     }
   }
   if (in.has_fov_h_rad()) {
     out.fov_h_rad = in.fov_h_rad();
-    // The scenario's own range, which is narrower, is checked where the frame is used.
-    constexpr limits::Interval kFovRad{limits::kFieldOfViewDeg.lo * physics::kDegree,
-                                       limits::kFieldOfViewDeg.hi * physics::kDegree};
-    if (!check.in_range("fov_h_rad", *out.fov_h_rad, kFovRad)) return DecodeStatus::invalid_view;
+    if (auto status = check_fov_h(*out.fov_h_rad, fault); status != DecodeStatus::ok) {
+      return status;
+    }
   }
   if (auto status = read_parts(in, out, fault); status != DecodeStatus::ok) return status;
   if (in.has_environment()) {

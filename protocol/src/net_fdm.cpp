@@ -27,8 +27,10 @@ struct WireVector {
 
 /// Layout of the fields that are read; offsets in bytes. Others are engines, tanks, gear, airspeed
 /// and control surfaces, and the velocity along body axes (88), whose meaning differs by sender.
+/// @param tanks_bytes  what the version has more about tanks
 template <class Io, class S>
-void layout(Io& io, S& s, WireVector& velocity_ft_s, WireVector& force_ft_s2) {
+void layout(Io& io, S& s, WireVector& velocity_ft_s, WireVector& force_ft_s2,
+            std::size_t tanks_bytes) {
   io.number(8, s.longitude_rad);
   io.number(16, s.latitude_rad);
   io.number(24, s.altitude_m);
@@ -44,8 +46,8 @@ void layout(Io& io, S& s, WireVector& velocity_ft_s, WireVector& force_ft_s2) {
   io.number(100, force_ft_s2.x);
   io.number(104, force_ft_s2.y);
   io.number(108, force_ft_s2.z);
-  io.number(356, s.unix_time_s);
-  io.number(360, s.warp_s);
+  io.number(356 + tanks_bytes, s.unix_time_s);
+  io.number(360 + tanks_bytes, s.warp_s);
 }
 
 [[nodiscard]] glm::dvec3 metres_of(const WireVector& feet) noexcept {
@@ -96,15 +98,20 @@ Fault decode(std::span<const std::byte> datagram, State& state) noexcept {
   const BigEndianReader io(datagram);
   std::uint32_t version = 0;
   io.number(0, version);
-  if (version == kVersion << 24) return {.kind = Fault::Kind::byte_order};
-  if (version != kVersion) {
+  if (version == kVersion << 24 || version == kTankVersion << 24) {
+    return {.kind = Fault::Kind::byte_order};
+  }
+  if (version != kVersion && version != kTankVersion) {
     return {.kind = Fault::Kind::version, .value = static_cast<double>(version)};
   }
-  if (datagram.size() != kBytes) return {.kind = Fault::Kind::size, .value = size};
+  const std::size_t bytes = version == kVersion ? kBytes : kTankBytes;
+  if (datagram.size() != bytes) {
+    return {.kind = Fault::Kind::size, .value = size, .lowest = static_cast<double>(bytes)};
+  }
   State read;
   WireVector velocity_ft_s;
   WireVector force_ft_s2;
-  layout(io, read, velocity_ft_s, force_ft_s2);
+  layout(io, read, velocity_ft_s, force_ft_s2, bytes - kBytes);
   read.velocity_ned_m_s = metres_of(velocity_ft_s);
   read.pilot_specific_force_m_s2 = metres_of(force_ft_s2);
   const Fault fault = check_state(read);
@@ -118,7 +125,7 @@ void encode(const State& state, std::span<std::byte, kBytes> datagram) noexcept 
   io.number(0, kVersion);
   WireVector velocity_ft_s = feet_of(state.velocity_ned_m_s);
   WireVector force_ft_s2 = feet_of(state.pilot_specific_force_m_s2);
-  layout(io, state, velocity_ft_s, force_ft_s2);
+  layout(io, state, velocity_ft_s, force_ft_s2, 0);
 }
 
 glm::dvec3 body_rates_rad_s(const State& state) noexcept {
@@ -141,16 +148,18 @@ std::string_view fault_text(const Fault& fault, std::span<char> buffer) noexcept
       out.add("no fault");
       break;
     case Fault::Kind::too_short:
-      out.add("{} bytes, must be {}", fault.value, kBytes);
+      out.add("{} bytes, must be {} or {}", fault.value, kBytes, kTankBytes);
       break;
     case Fault::Kind::byte_order:
       out.add("the sender's byte order is little endian, must be big endian");
       break;
     case Fault::Kind::version:
-      out.add("version {}, must be {}", fault.value, kVersion);
+      out.add("version {}, must be {} or {}", fault.value, kVersion, kTankVersion);
       break;
     case Fault::Kind::size:
-      out.add("{} bytes, version {} has {}", fault.value, kVersion, kBytes);
+      out.add("{} bytes, version {} has {}", fault.value,
+              fault.lowest == static_cast<double>(kTankBytes) ? kTankVersion : kVersion,
+              fault.lowest);
       break;
     case Fault::Kind::field:
       out.add("{} is {}", fault.field, fault.value);

@@ -18,6 +18,7 @@
 #include "rt/doorbell.hpp"
 #include "rt/histogram.hpp"
 #include "rt/motion_times.hpp"
+#include "rt/picture_board.hpp"
 #include "rt/prediction_error.hpp"
 #include "rt/shortage.hpp"
 #include "rt/spsc_ring.hpp"
@@ -100,6 +101,7 @@ struct Context {
   MotionTimes motion_times;
   RunBoard run;
   AxesBoard axes;
+  PictureBoard picture;  ///< what a host wants people to see; the console follows it
   FrameTrace trace;
   Doorbells bells;
   std::vector<Channel> channels;             ///< fixed before the agents run

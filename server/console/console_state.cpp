@@ -180,6 +180,18 @@ void add_axes(std::string& text, Context& context) {
   text += "]}";
 }
 
+/// Appends what a host wants people to see; null: it wants nothing.
+void add_picture(std::string& text, const PictureBoard& board) {
+  const auto picture = board.get();
+  if (!picture) {
+    text += "null";
+    return;
+  }
+  fmt::format_to(
+      Out(text), R"({{"on":{},"black_hot":{},"automatic_gain":{},"low_k":{:.4f},"high_k":{:.4f}}})",
+      picture->on, picture->black_hot, picture->automatic_gain, picture->low_k, picture->high_k);
+}
+
 }  // namespace
 
 std::string console_hello(const ConsoleFacts& facts, const Context& context, bool may_command) {
@@ -239,6 +251,8 @@ std::string console_status(Context& context, ConsoleTap& tap, const StatusBoard&
   });
   text += ",\"axes\":";
   add_axes(text, context);
+  text += ",\"picture\":";
+  add_picture(text, context.picture);
   text += ",\"ticks\":[";
   while (const FrameTick* tick = tap.ticks().front()) {
     if (text.back() != '[') text += ',';

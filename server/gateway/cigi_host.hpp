@@ -15,12 +15,14 @@
 #include "gateway/cigi_clock.hpp"
 #include "gateway/cigi_entities.hpp"
 #include "gateway/cigi_heat.hpp"
+#include "gateway/cigi_picture.hpp"
 #include "gateway/cigi_queries.hpp"
 #include "gateway/cigi_weather.hpp"
 #include "gateway/georeference.hpp"
 #include "gateway/host_gateway.hpp"
 #include "gateway/scene_query.hpp"
 #include "rt/counters.hpp"
+#include "rt/picture_board.hpp"
 #include "telemetry/event_log.hpp"
 
 namespace emit::server {
@@ -41,8 +43,9 @@ class CigiHost final : public HostGateway {
     std::int64_t first_time_ns = 0;  ///< simulation time of the first message of a run
     const scene::ScenarioDesc* scenario = nullptr;  ///< null: there is none
     bool is_view_fixed = false;                     ///< hosts cannot set the field of view
+    PictureBoard* picture = nullptr;                ///< takes Sensor Control; null: nobody looks
   };
-  /// The scenario, the counters and the events outlive the object.
+  /// The scenario, the picture, the counters and the events outlive the object.
   /// @param scene  what questions are about; null: there are no answers
   CigiHost(const Options& options, std::unique_ptr<SceneQuery> scene, Counters& counters,
            EventLog& events);
@@ -62,6 +65,7 @@ class CigiHost final : public HostGateway {
   void take_database(std::int8_t wanted) noexcept;
   void take_packet(const protocol::cigi::Packet& packet) noexcept;
   void take_view(const protocol::cigi::ViewDefinition& packet) noexcept;
+  void take_sensor(const protocol::cigi::SensorControl& packet) noexcept;
   void take_sky(const protocol::cigi::CelestialSphereControl& packet) noexcept;
   void begin_run(std::int64_t received_ns, std::int64_t first_time_ns) noexcept;
   void forget() noexcept;
@@ -101,6 +105,7 @@ class CigiHost final : public HostGateway {
   CigiEntities entities_;
   CigiQueries queries_;
   CigiWeather weather_;
+  CigiPicture picture_;
   CigiHeat heat_;
 
   protocol::cigi::IgMode mode_ = protocol::cigi::IgMode::standby;

@@ -294,6 +294,7 @@ void TableFollower::follow(std::int64_t now_ns, std::int64_t time_ns) noexcept {
   followed_ns_ = time_ns;
   const double blended_s = seconds_of(time_ns - blend_ns_);
   bool limited = false;
+  bool is_outside = false;
   bool reached = true;
   for (std::size_t i = 0; i < profiles_.size(); ++i) {
     AxisMotion demand = sum(course[i], blends_[i].at(blended_s));
@@ -307,6 +308,7 @@ void TableFollower::follow(std::int64_t now_ns, std::int64_t time_ns) noexcept {
     const AxisProfile::Command command = profiles_[i].step(demand, step_s, share(now_ns));
     command_.axes[i] = command.motion;
     limited = limited || command.limited();
+    is_outside = is_outside || command.travel_limited;
     reached = reached &&
               std::abs(command.motion.angle_rad - command.wanted.angle_rad) < kReachedRad &&
               std::abs(command.motion.rate_rad_s - command.wanted.rate_rad_s) < kReachedRadS;
@@ -315,8 +317,9 @@ void TableFollower::follow(std::int64_t now_ns, std::int64_t time_ns) noexcept {
   captured_ = captured_ || now_ns - unsettled_ns_ >= kSettleNs;
   const bool following = captured_ && monitor_.state == AxesState::following;
   status_.state = following ? MotionState::following : MotionState::capturing;
-  // Limits only say that the axes are under way as long as they set off.
-  if (following && (limited || monitor_.limited_axes != 0)) {
+  // Limits of rate and acceleration only say that the axes are under way as long as they set off. A
+  // demand outside of the travel is one that they cannot meet however long they take.
+  if (is_outside || (following && (limited || monitor_.limited_axes != 0))) {
     status_.faults |= protocol::kMotionLimit;
   }
   if (near_lock_) status_.faults |= protocol::kMotionLock;

@@ -21,7 +21,7 @@ import unittest  # noqa: E402
 
 import numpy as np  # noqa: E402
 from console_daemon import (  # noqa: E402
-    HEIGHT_PX, IG_CLOCK, STEP_NS, WIDTH_PX, address_of, start, swinging_axes)
+    HEIGHT_PX, IG_CLOCK, STEP_NS, WIDTH_PX, CigiRig, address_of, start, swinging_axes)
 from emit_client import FrameClient, HostClient, Pose  # noqa: E402
 
 PATIENCE_S = 120.0
@@ -89,6 +89,64 @@ class Console(unittest.TestCase):
                 "seen.add(data[i] << 16 | data[i + 1] << 8 | data[i + 2]); return seen.size; })()")
             self.assertGreater(colors, 30)
             self.assert_stays_on_this_machine(daemon)
+
+    def brightness(self):
+        """Returns how bright pixels of a row are drawn, from the one with the smallest value to the largest."""
+        return self.page.evaluate(
+            "(() => { const image = emitConsole.image; const gl = image.gl; image.draw(); const seen = [];"
+            f"for (let x = 0; x < {WIDTH_PX}; x += 8) {{ const data = new Uint8Array(4);"
+            f"gl.readPixels(x, {HEIGHT_PX - 1 - 60}, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, data);"
+            "seen.push([image.value({ x, y: 60 }), data[0]]); }"
+            "return seen.sort((a, b) => a[0] - b[0]).map((one) => one[1]); })()")
+
+    def test_follows_sensor_control_of_a_cigi_host_until_a_limit_is_set_by_hand(self):
+        with CigiRig() as rig:
+            self.open(rig.daemon)
+            self.page.wait_for("document.querySelector('#state').textContent === 'running'", PATIENCE_S)
+            end_s = time.monotonic() + PATIENCE_S
+            while not self.page.evaluate(f"{SHOWN} > 0 && emitConsole.showsKelvins"):
+                self.assertLess(time.monotonic(), end_s, "no image came")
+                # The page may be slow to ask for an image, and one comes only with a further frame.
+                for _ in range(5):
+                    rig.step()
+            limits = "[emitConsole.low, emitConsole.high]"
+            button = "document.querySelector('#auto').textContent"
+            self.assertEqual(self.page.evaluate(button), "Auto")
+            self.page.press("m")  # grey shows polarity plainly
+            found = self.page.evaluate(limits)
+            rig.step(gain=0.5, level=0.5)
+            self.page.wait_for(f"{button} === 'Host' && String({limits}) === '280,330'", PATIENCE_S)
+            white = self.brightness()
+            self.assertEqual(white, sorted(white))
+            self.assertGreater(white[-1], white[0])
+            rig.step(gain=0.5, level=0.5, black_hot=True)
+            self.page.wait_for("emitConsole.wish.black_hot", PATIENCE_S)
+            self.assertEqual(self.page.evaluate(limits), [280, 330])
+            black = self.brightness()
+            self.assertEqual(black, sorted(black, reverse=True))
+            self.assertGreater(black[0], black[-1])
+            # Off is black, and a limit by hand shows what emitd sends all the same.
+            rig.step(on=False)
+            self.page.wait_for("emitConsole.image.blank", PATIENCE_S)
+            self.page.wait_for("document.querySelector('#stale').textContent.includes('switched the sensor off')"
+                               " && !document.querySelector('#stale').hidden", PATIENCE_S)
+            self.assertEqual(set(self.brightness()), {0})
+            self.page.press("=")
+            self.page.wait_for("!emitConsole.image.blank && emitConsole.wish === null", PATIENCE_S)
+            by_hand = self.page.evaluate(limits)
+            rig.step(gain=0.9, level=0.1)
+            self.page.wait_for("emitConsole.picture.on", PATIENCE_S)
+            self.assertEqual(self.page.evaluate(limits), by_hand)
+            self.page.press("r")
+            width_k = 50 * 10**-0.8
+            self.page.wait_for(f"Math.abs(emitConsole.high - emitConsole.low - {width_k}) < 1e-3", PATIENCE_S)
+            # Automatic gain is the page's own.
+            rig.step(automatic=True)
+            self.page.wait_for("emitConsole.picture.automatic_gain", PATIENCE_S)
+            again = self.page.evaluate(limits)
+            for want, got in zip(found, again):
+                self.assertAlmostEqual(want, got, delta=0.2 * (found[1] - found[0]))
+            self.assert_stays_on_this_machine(rig.daemon)
 
     def test_a_command_changes_the_run(self):
         with start(IG_CLOCK) as daemon:

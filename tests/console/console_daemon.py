@@ -4,9 +4,11 @@ import contextlib
 import math
 import pathlib
 import signal
+import socket
 import subprocess
 import tempfile
 
+from cigi_host import OPERATE, CigiHost
 from daemon import BIN_DIR, Daemon
 
 WIDTH_PX, HEIGHT_PX = 160, 120
@@ -14,8 +16,9 @@ STEP_NS = 5_000_000
 IG_CLOCK = 'mode = "ig-clock"\nrate_hz = 50.0'
 
 
-def start(pacing, address="127.0.0.1:0", more=""):
-    return Daemon(WIDTH_PX, HEIGHT_PX, pacing, more=f'[console]\nlisten = "{address}"\nrate_hz = 20.0\n{more}')
+def start(pacing, address="127.0.0.1:0", more="", head=""):
+    return Daemon(WIDTH_PX, HEIGHT_PX, pacing, head=head,
+                  more=f'[console]\nlisten = "{address}"\nrate_hz = 20.0\n{more}')
 
 
 @contextlib.contextmanager
@@ -45,6 +48,42 @@ def swinging_axes(seconds, amplitude_rad, rate_rad_s, delay_s):
                                 stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         stack.callback(lambda: (host.send_signal(signal.SIGINT), host.wait(30)))
         yield daemon
+
+
+class CigiRig:
+    """A daemon in lock step with a CIGI host. The channels are those of a scenario, so that they have temperatures."""
+
+    def __init__(self, kind=CigiHost, display_k=(280, 330)):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.bind(("127.0.0.1", 0))
+            listen = probe.getsockname()[1]
+        self.host = kind(("127.0.0.1", listen))
+        try:
+            with tempfile.NamedTemporaryFile("w", suffix=".toml") as scenario:
+                scenario.write(f'[sensor]\nwidth_px = {WIDTH_PX}\nheight_px = {HEIGHT_PX}\n[display]\n'
+                               f'min_k = {display_k[0]}\nmax_k = {display_k[1]}\n'
+                               '[[object]]\ngltf = "share:scenes/box.glb"\n')
+                scenario.flush()
+                self.daemon = start('mode = "host-step"', head=f'scenario = "{scenario.name}"\n', more=(
+                    f'[cigi]\nlisten = "127.0.0.1:{listen}"\nhost = "127.0.0.1:{self.host.port}"\nrate_hz = 20.0\n'))
+        except BaseException:
+            self.host.close()
+            raise
+        self.host.begin()
+
+    def step(self, **wishes):
+        """Sends a pose, with Sensor Control where there are wishes, and waits for the next Start Of Frame."""
+        self.host.send(self.host.control(OPERATE), self.host.entity(0, (48.0, 11.0, 100.0)),
+                       *([self.host.sensor(**wishes)] if wishes else []))
+        while self.host.receive()["last_host"] != self.host.host_frame:
+            pass
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.daemon.close()
+        self.host.close()
 
 
 def address_of(daemon):

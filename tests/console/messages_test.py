@@ -15,7 +15,8 @@ import time  # noqa: E402
 import unittest  # noqa: E402
 
 import websockets  # noqa: E402
-from console_daemon import IG_CLOCK, HEIGHT_PX, STEP_NS, WIDTH_PX, address_of, start  # noqa: E402
+from cigi_host import CigiHost, CigiHost4  # noqa: E402
+from console_daemon import IG_CLOCK, HEIGHT_PX, STEP_NS, WIDTH_PX, CigiRig, address_of, start  # noqa: E402
 from emit_client import FrameClient, HostClient, Pose  # noqa: E402
 
 PATIENCE_S = 60.0
@@ -143,6 +144,28 @@ class Commands(unittest.TestCase):
             answer = page.answer("stop")
             self.assertEqual((answer["ok"], answer["text"]), (False, "console.commands does not allow it"))
             self.assertTrue(page.next_that(lambda message: message["type"] == "status")["running"])
+
+
+class Picture(unittest.TestCase):
+    def test_is_what_sensor_control_of_a_cigi_host_asks_for(self):
+        for kind in (CigiHost, CigiHost4):
+            with CigiRig(kind, display_k=(270, 290)) as rig, Page(address_of(rig.daemon)) as page:
+                def wanted(picture):
+                    page.next_that(lambda message: message["type"] == "status" and message["picture"] == picture)
+
+                rig.step()
+                wanted(None)
+                rig.step(gain=0.5, level=0.5)
+                wanted({"on": True, "black_hot": False, "automatic_gain": False, "low_k": 270.0, "high_k": 290.0})
+                rig.step(gain=0.5, level=1.0, black_hot=True)
+                wanted({"on": True, "black_hot": True, "automatic_gain": False, "low_k": 280.0, "high_k": 300.0})
+                rig.step(gain=0.5, level=0.5, on=False, automatic=True)
+                wanted({"on": False, "black_hot": False, "automatic_gain": True, "low_k": 270.0, "high_k": 290.0})
+                rig.step()
+                wanted({"on": False, "black_hot": False, "automatic_gain": True, "low_k": 270.0, "high_k": 290.0})
+                rig.host.send(rig.host.control(0))
+                rig.host.wait_mode(0)
+                wanted(None)
 
 
 class Images(unittest.TestCase):

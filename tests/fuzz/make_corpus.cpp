@@ -626,6 +626,9 @@ void make_net_fdm_seeds() {
                             std::span(bytes).first<protocol::net_fdm::kBytes>());
   write("net_fdm", "flight", bytes);
   bytes[3] = std::byte{25};
+  write("net_fdm", "short_version_25", bytes);
+  bytes.insert(bytes.begin() + protocol::net_fdm::kTanksAt,
+               protocol::net_fdm::kTankBytes - protocol::net_fdm::kBytes, std::byte{0});
   write("net_fdm", "version_25", bytes);
 }
 

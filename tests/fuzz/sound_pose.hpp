@@ -2,6 +2,7 @@
 #pragma once
 #include <cmath>
 
+#include "emit/physics/constants.hpp"
 #include "emit/protocol/codec.hpp"
 #include "fuzz/fuzz_input.hpp"
 
@@ -24,6 +25,15 @@ inline void require_sound(const protocol::HostFrameData& frame) {
   require_sound(frame.seeker);
   for (const auto& entity : frame.entity_span()) {
     if (entity.has_pose) require_sound(entity.pose);
+  }
+  if (frame.fov_h_rad) {
+    require(*frame.fov_h_rad > 0.0 && *frame.fov_h_rad < 3.0, "fields of view are within limits");
+  }
+  if (frame.gimbal_rad) {
+    const glm::dvec3& g = *frame.gimbal_rad;
+    for (const double angle_rad : {g.x, g.y, g.z}) {
+      require(std::abs(angle_rad) <= physics::kPi, "gimbals turn by half a turn at most");
+    }
   }
   if (frame.environment) {
     require(std::isfinite(frame.environment->air_k), "the weather is made of numbers");

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Hosts that speak CIGI 3.3 and 4.0, written from the published layouts alone: they share no code with emitd."""
+import contextlib
 import select
 import socket
 import struct
 
 STANDBY, OPERATE = 0, 1
+SO_RCVBUFFORCE = 33  # beyond net.core.rmem_max, for root
 
 
 class CigiHost:
@@ -13,6 +15,10 @@ class CigiHost:
     def __init__(self, ig_address, order="<"):
         self.order = order
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        # Start Of Frame goes on while this host does not come to its turn. Its counter shows any that is lost.
+        for option in (socket.SO_RCVBUF, SO_RCVBUFFORCE):
+            with contextlib.suppress(PermissionError):
+                self.socket.setsockopt(socket.SOL_SOCKET, option, 8 << 20)
         self.socket.bind(("127.0.0.1", 0))
         self.socket.settimeout(20.0)
         self.ig_address = ig_address
@@ -81,7 +87,7 @@ class CigiHost:
 
         kind = read("H", 2)
         if kind == 0x0FF0:
-            return packet[6:].split(b"\0")[0].decode()
+            return packet[8:].split(b"\0")[0].decode()
         if kind == 0x0FFF:
             return {"id": 102, "request": read("H", 6), "valid": bool(packet[4] & 1), "lsn": packet[4] >> 4,
                     "hot": bool(packet[4] & 2), "height_m": read("d", 8)}
@@ -98,6 +104,12 @@ class CigiHost:
                     "entity": read("H", 6) if packet[8] & 2 else None, "visible": bool(packet[8] & 8),
                     "range_m": read("d", 16), "place": struct.unpack_from(order + "ddd", packet, 24),
                     "material": read("I", 52), "azimuth_deg": read("f", 56), "elevation_deg": read("f", 60)}
+        if kind == 0x0FFB:
+            return {"id": 106, "sensor": packet[4], "view": read("H", 6), "state": packet[5] & 3,
+                    "frame": read("I", 20)}
+        if kind == 0x0FFA:
+            return {"id": 107, "sensor": packet[8], "view": read("H", 4), "state": packet[9] & 3,
+                    "frame": read("I", 24), "entity": read("H", 6) if packet[9] & 4 else None}
         raise AssertionError(f"answer {kind:#06x}")
 
     def drain(self):
@@ -122,6 +134,11 @@ class CigiHost:
             out |= {"entity": read("H", 6) if packet[4] & 2 else None, "visible": bool(packet[4] & 8),
                     "range_m": read("d", 8), "place": struct.unpack_from(order + "ddd", packet, 16),
                     "material": read("I", 44), "azimuth_deg": read("f", 48), "elevation_deg": read("f", 52)}
+        elif packet[0] in (106, 107):
+            out = {"id": packet[0], "view": read("H", 2), "sensor": packet[4], "state": packet[5] & 3,
+                   "frame": read("I", 20)}
+            if packet[0] == 107:
+                out["entity"] = read("H", 6) if packet[5] & 4 else None
         elif packet[0] == 108:
             out = {"id": 108, "object": read("H", 2), "place": struct.unpack_from(order + "ddd", packet, 8),
                    "roll_pitch_yaw_deg": struct.unpack_from(order + "fff", packet, 32), "flags": packet[5]}
@@ -168,6 +185,14 @@ class CigiHost:
 
     def atmosphere(self, air_c, wind_m_s):
         return struct.pack(self.order + "BBBBffffff4x", 10, 32, 1, 50, air_c, 20000.0, wind_m_s, 0.0, 0.0, 1013.0)
+
+    def ellipsoid(self, radius_m, flattening):
+        return struct.pack(self.order + "BBB5xdd", 19, 24, 1, radius_m, flattening)
+
+    def sensor(self, gain=0.5, level=0.5, on=True, black_hot=False, automatic=False, track=0, extended=False, noise=0.0,
+               view=0, sensor=0):
+        flags = on | black_hot << 1 | automatic << 3 | track << 5
+        return struct.pack(self.order + "BBHBBBxffff", 17, 24, view, sensor, flags, extended, gain, level, 0.0, noise)
 
     def unknown(self):
         """Makes a packet that users have defined."""
@@ -239,6 +264,11 @@ class CigiHost4(CigiHost):
     def sky(self, hour, minute, month, day, year, second=0.0):
         return self._packet(0x0008, "BxBBfIf4x", 1 | 2 | 16, hour, minute, second, month * 1000000 + day * 10000 + year,
                             0.0)
+
+    def sensor(self, gain=0.5, level=0.5, on=True, black_hot=False, automatic=False, track=0, extended=False, noise=0.0,
+               view=0, sensor=0):
+        flags = on | black_hot << 1 | automatic << 3 | track << 5
+        return self._packet(0x0010, "BBBxHxxffff4x", sensor, flags, extended, view, gain, level, 0.0, noise)
 
     def unknown(self):
         return self._packet(0x9000, "I", 2)

@@ -119,6 +119,9 @@ TEST(LogCsv, TheTableOfTheSeekerIsAPoseLogWithTheSamePoses) {
       frame->frame_number = 10 + i;
       frame->sim_time_ns = -3 + static_cast<std::int64_t>(i * i * 123'456'789);
       frame->seeker.position_world_m.x = 1.0 / static_cast<double>(i) - 1e-9;
+      if (i == 3) frame->seeker_rates.reset();
+      if (i != 2) frame->fov_h_rad = 0.3 / static_cast<double>(i);
+      if (i > 2) frame->gimbal_rad = glm::dvec3(-0.1, 1.0 / 3.0, 0.7 * static_cast<double>(i));
       ASSERT_TRUE(writer->write_host(*frame, 0));
       sent.push_back(*frame);
     }
@@ -136,6 +139,15 @@ TEST(LogCsv, TheTableOfTheSeekerIsAPoseLogWithTheSamePoses) {
     EXPECT_EQ(poses->host().sim_time_ns, frame.sim_time_ns);
     EXPECT_EQ(poses->host().seeker.position_world_m, frame.seeker.position_world_m);
     EXPECT_EQ(poses->host().seeker.world_from_body, frame.seeker.world_from_body);
+    ASSERT_EQ(poses->host().seeker_rates.has_value(), frame.seeker_rates.has_value());
+    if (frame.seeker_rates) {
+      EXPECT_EQ(poses->host().seeker_rates->velocity_world_m_s,
+                frame.seeker_rates->velocity_world_m_s);
+      EXPECT_EQ(poses->host().seeker_rates->angular_rate_body_rad_s,
+                frame.seeker_rates->angular_rate_body_rad_s);
+    }
+    EXPECT_EQ(poses->host().fov_h_rad, frame.fov_h_rad);
+    EXPECT_EQ(poses->host().gimbal_rad, frame.gimbal_rad);
   }
   EXPECT_FALSE(*poses->next());
   const auto entities = export_log_csv(in, folder.file("e.csv"), {.table = LogTable::entities});

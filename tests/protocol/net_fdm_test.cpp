@@ -92,6 +92,32 @@ TEST(NetFdm, FieldsAreReadAtTheirOffsetsInSiUnits) {
   EXPECT_EQ(state.warp_s, expected.warp_s);
 }
 
+/// The same datagram in version 25: 16 and 128 bytes about tanks stand between tanks and gear.
+std::vector<std::byte> golden_25() {
+  std::vector<std::byte> bytes = test::from_hex(kGoldenFdm);
+  bytes[3] = std::byte{25};
+  bytes.insert(bytes.begin() + kTanksAt, 144, std::byte{0x3F});
+  return bytes;
+}
+
+TEST(NetFdm, TheVersionOfNewerFlightGearHasTheSameFields) {
+  State state;
+  EXPECT_EQ(text_of_fdm(decode(golden_25(), state)), "no fault");
+  State of_24;
+  EXPECT_FALSE(decode(test::from_hex(kGoldenFdm), of_24));
+  EXPECT_TRUE(state == of_24);
+  std::vector<std::byte> wrong = golden_25();
+  wrong.pop_back();
+  EXPECT_EQ(text_of_fdm(decode(wrong, state)), "551 bytes, version 25 has 552");
+  wrong.resize(408);
+  EXPECT_EQ(text_of_fdm(decode(wrong, state)), "408 bytes, version 25 has 552");
+  std::vector<std::byte> swapped = golden_25();
+  std::reverse(swapped.begin(), swapped.begin() + 4);
+  EXPECT_EQ(text_of_fdm(decode(swapped, state)),
+            "the sender's byte order is little endian, must be big endian");
+  EXPECT_TRUE(state == of_24);
+}
+
 TEST(NetFdm, TheEncoderWritesTheSameBytesAndZerosElsewhere) {
   const auto golden = test::from_hex(kGoldenFdm);
   const FdmBytes bytes = encoded(golden_state());
@@ -118,14 +144,14 @@ TEST(NetFdm, OtherVersionsSizesAndOrdersAreRefused) {
     return text_of_fdm(fault);
   };
   const FdmBytes good = encoded({});
-  EXPECT_EQ(refused({}), "0 bytes, must be 408");
-  EXPECT_EQ(refused(std::span(good).first(3)), "3 bytes, must be 408");
+  EXPECT_EQ(refused({}), "0 bytes, must be 408 or 552");
+  EXPECT_EQ(refused(std::span(good).first(3)), "3 bytes, must be 408 or 552");
   EXPECT_EQ(refused(std::span(good).first(407)), "407 bytes, version 24 has 408");
   std::vector<std::byte> longer(good.begin(), good.end());
   longer.resize(552);
   EXPECT_EQ(refused(longer), "552 bytes, version 24 has 408");
-  put_number(std::span(longer), 0, std::uint32_t{25});
-  EXPECT_EQ(refused(longer), "version 25, must be 24");
+  put_number(std::span(longer), 0, std::uint32_t{26});
+  EXPECT_EQ(refused(longer), "version 26, must be 24 or 25");
   FdmBytes swapped = good;
   std::reverse(swapped.begin(), swapped.begin() + 4);
   EXPECT_EQ(refused(swapped), "the sender's byte order is little endian, must be big endian");
@@ -188,11 +214,11 @@ TEST(NetFdm, NothingAllocates) {
   const auto before = test::heap_request_count();
   encode(golden_state(), bytes);
   const Fault good = decode(bytes, state);
-  bytes[3] = std::byte{25};
+  bytes[3] = std::byte{26};
   const auto words = fault_text(decode(bytes, state), text);
   EXPECT_EQ(test::heap_request_count(), before);
   EXPECT_FALSE(good);
-  EXPECT_EQ(words, "version 25, must be 24");
+  EXPECT_EQ(words, "version 26, must be 24 or 25");
 }
 
 }  // namespace

@@ -105,6 +105,75 @@ TEST_F(PoseCsv, ColumnsOfPartsDriveThem) {
   EXPECT_EQ(reader->host().parts[1].value, 0.25);
 }
 
+TEST_F(PoseCsv, ColumnsOfTheViewSetZoomAndGimbalWhereTheyAreNotEmpty) {
+  std::ofstream(path_) << "fov_h_rad,sim_time_s,gimbal_roll_rad,gimbal_yaw_rad,gimbal_pitch_rad,"
+                          "east_m,north_m,up_m,qw,qx,qy,qz\n"
+                          "0.10000000000000001,0,0.3,-0.1,0.2,0,0,0,1,0,0,0\n"
+                          ",1,,,,0,0,0,1,0,0,0\n"
+                          "0.25,2,,,,0,0,0,1,0,0,0\n"
+                          ",3,0,3.1415926535897931,0,0,0,0,1,0,0,0\n";
+  auto reader = PoseCsvReader::open(path_);
+  ASSERT_TRUE(reader) << reader.error().text;
+  ASSERT_TRUE(reader->next().value());
+  EXPECT_EQ(reader->host().fov_h_rad, 0.1);
+  EXPECT_EQ(reader->host().gimbal_rad, glm::dvec3(-0.1, 0.2, 0.3));
+  ASSERT_TRUE(reader->next().value());
+  EXPECT_FALSE(reader->host().fov_h_rad);
+  EXPECT_FALSE(reader->host().gimbal_rad);
+  ASSERT_TRUE(reader->next().value());
+  EXPECT_EQ(reader->host().fov_h_rad, 0.25);
+  EXPECT_FALSE(reader->host().gimbal_rad);
+  ASSERT_TRUE(reader->next().value());
+  EXPECT_FALSE(reader->host().fov_h_rad);
+  EXPECT_EQ(reader->host().gimbal_rad, glm::dvec3(3.1415926535897931, 0.0, 0.0));
+}
+
+TEST_F(PoseCsv, ColumnsOfRatesAreThoseOfTheSeekerWhereTheyAreNotEmpty) {
+  const std::string poses = "sim_time_s,east_m,north_m,up_m,qw,qx,qy,qz";
+  const std::string rates =
+      ",velocity_east_m_s,velocity_north_m_s,velocity_up_m_s,rate_x_rad_s,rate_y_rad_s,"
+      "rate_z_rad_s\n";
+  std::ofstream(path_) << poses << rates << "0,0,0,0,1,0,0,0,10,-20.5,30,0.1,-0.2,0.3\n"
+                       << "1,0,0,0,1,0,0,0,,,,,,\n";
+  auto reader = PoseCsvReader::open(path_);
+  ASSERT_TRUE(reader) << reader.error().text;
+  ASSERT_TRUE(reader->next().value());
+  ASSERT_TRUE(reader->host().seeker_rates);
+  EXPECT_EQ(reader->host().seeker_rates->velocity_world_m_s, glm::dvec3(10.0, -20.5, 30.0));
+  EXPECT_EQ(reader->host().seeker_rates->angular_rate_body_rad_s, glm::dvec3(0.1, -0.2, 0.3));
+  ASSERT_TRUE(reader->next().value());
+  EXPECT_FALSE(reader->host().seeker_rates);
+  const std::string row = poses + rates + "0,0,0,0,1,0,0,0,";
+  EXPECT_THAT(outcome(row + "1,2,3,4,,6\n"), HasSubstr(":2:25: column 'rate_y_rad_s': no value"));
+  EXPECT_THAT(outcome(row + "1,2e9,3,4,5,6\n"),
+              HasSubstr(":2:19: column 'velocity_north_m_s': 2e9 is out of range, must be -"));
+  EXPECT_THAT(outcome(row + "1,2,3,4,5,nan\n"), HasSubstr("column 'rate_z_rad_s': nan is out"));
+  EXPECT_THAT(outcome(poses + ",rate_x_rad_s\n"),
+              HasSubstr(":1:44: column 'velocity_east_m_s' is missing: it belongs to "
+                        "'rate_x_rad_s'"));
+}
+
+TEST_F(PoseCsv, ErrorsOfTheViewNameLineAndColumn) {
+  const std::string poses = "sim_time_s,east_m,north_m,up_m,qw,qx,qy,qz";
+  const std::string head =
+      poses + ",fov_h_rad,gimbal_yaw_rad,gimbal_pitch_rad,gimbal_roll_rad\n0,0,0,0,1,0,0,0,";
+  EXPECT_EQ(outcome(head + "1,0,0,0\n"), "1 rows");
+  EXPECT_THAT(outcome(head + "wide,0,0,0\n"),
+              HasSubstr(":2:17: column 'fov_h_rad': 'wide' is not a number"));
+  EXPECT_THAT(outcome(head + "3,0,0,0\n"),
+              HasSubstr(":2:17: column 'fov_h_rad': 3 is out of range, must be 0.000174"));
+  EXPECT_THAT(outcome(head + "nan,0,0,0\n"), HasSubstr("column 'fov_h_rad': nan is out of"));
+  EXPECT_THAT(outcome(head + ",0,3.2,0\n"),
+              HasSubstr(":2:20: column 'gimbal_pitch_rad': 3.2 is out of range, must be -3.14159"));
+  EXPECT_THAT(outcome(head + ",0,0,-inf\n"), HasSubstr("column 'gimbal_roll_rad': -inf is out"));
+  EXPECT_THAT(outcome(head + ",0,,0\n"), HasSubstr(":2:20: column 'gimbal_pitch_rad': no value"));
+  EXPECT_THAT(outcome(poses + ",gimbal_pitch_rad\n"),
+              HasSubstr(":1:44: column 'gimbal_yaw_rad' is missing: it belongs to "
+                        "'gimbal_pitch_rad'"));
+  EXPECT_THAT(outcome(poses + ",fov_h_rad,fov_h_rad\n"),
+              HasSubstr("column 'fov_h_rad' appears twice"));
+}
+
 TEST_F(PoseCsv, ErrorsOfPartsNameLineAndColumn) {
   const std::string head = "sim_time_s,east_m,north_m,up_m,qw,qx,qy,qz,entity_7.part_1.power_w_m2";
   EXPECT_THAT(outcome(head + "\n0,0,0,0,1,0,0,0,hot\n"),

@@ -3,14 +3,15 @@
 #include <cstdlib>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "support/emit_process.hpp"
 
 namespace emit::test {
 
-/// Returns the folder of the packages for Node.js that tests read emitd's output with; empty where
-/// Node.js or one of them is missing. deploy/scripts/install_deps.sh --with-peers installs them.
-inline std::string node_peers(const std::vector<std::string>& packages) {
+/// Returns the folder to which deploy/scripts/install_deps.sh --with-peers brings programs that
+/// Debian does not install.
+inline std::filesystem::path peers_folder() {
   const auto of = [](const char* name) {
     const char* value = std::getenv(name);
     return std::string(value != nullptr ? value : "");
@@ -22,6 +23,13 @@ inline std::string node_peers(const std::vector<std::string>& packages) {
                             : std::filesystem::path(cache)) /
              "emit/peers";
   }
+  return folder;
+}
+
+/// Returns the folder of the packages for Node.js that tests read emitd's output with; empty where
+/// Node.js or one of them is missing. deploy/scripts/install_deps.sh --with-peers installs them.
+inline std::string node_peers(const std::vector<std::string>& packages) {
+  const std::filesystem::path folder = peers_folder();
   for (const std::string& package : packages) {
     if (!std::filesystem::exists(folder / "node_modules" / package / "package.json")) return {};
   }

@@ -26,13 +26,14 @@ constexpr std::size_t kPoseCells = 7;
 constexpr const char* kRateColumns =
     "velocity_east_m_s,velocity_north_m_s,velocity_up_m_s,rate_x_rad_s,rate_y_rad_s,rate_z_rad_s";
 constexpr std::size_t kRateCells = 6;
+constexpr const char* kViewColumns = "fov_h_rad,gimbal_yaw_rad,gimbal_pitch_rad,gimbal_roll_rad";
 constexpr const char* kHostColumns =
     "source,run_id,host_run_id,log_time_ns,frame_number,sim_time_s";
 
 std::string header_of(LogTable table) {
   switch (table) {
     case LogTable::seeker:
-      return fmt::format("{},{},{}", kHostColumns, kPoseColumns, kRateColumns);
+      return fmt::format("{},{},{},{}", kHostColumns, kPoseColumns, kRateColumns, kViewColumns);
     case LogTable::entities:
       return fmt::format("{},entity_id,on,teleport,{},{}", kHostColumns, kPoseColumns,
                          kRateColumns);
@@ -75,6 +76,16 @@ void put_rates(CsvFile& file, const v1::Pose& pose) {
   const v1::Vector3& rate = pose.angular_rate_rad_s();
   file.number(velocity.x()).number(velocity.y()).number(velocity.z());
   file.number(rate.x()).number(rate.y()).number(rate.z());
+}
+
+void put_view(CsvFile& file, const v1::HostFrame& frame) {
+  frame.has_fov_h_rad() ? file.number(frame.fov_h_rad()) : file.empty();
+  if (!frame.has_gimbal()) {
+    file.empty(3);
+    return;
+  }
+  const v1::Gimbal& gimbal = frame.gimbal();
+  file.number(gimbal.yaw_rad()).number(gimbal.pitch_rad()).number(gimbal.roll_rad());
 }
 
 std::string_view name_of(v1::Command::Kind kind) {
@@ -194,6 +205,7 @@ class Exporter {
       put_origin(*file, frame, origin);
       put_pose(*file, frame.seeker());
       put_rates(*file, frame.seeker());
+      put_view(*file, frame);
       file->end_row();
     }
     if (CsvFile* file = of(LogTable::entities)) {

@@ -3,10 +3,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -25,10 +27,50 @@ using physics::Error;
 using physics::ErrorCode;
 using physics::Result;
 
-enum Column : std::size_t { kTime, kEast, kNorth, kUp, kQw, kQx, kQy, kQz, kFrame, kColumns };
-constexpr std::array<std::string_view, kColumns> kNames{
-    "sim_time_s", "east_m", "north_m", "up_m", "qw", "qx", "qy", "qz", "frame_number"};
+enum Column : std::size_t {
+  kTime,
+  kEast,
+  kNorth,
+  kUp,
+  kQw,
+  kQx,
+  kQy,
+  kQz,
+  kFrame,
+  kFov,
+  kGimbalYaw,
+  kGimbalPitch,
+  kGimbalRoll,
+  kVelocityEast,
+  kVelocityNorth,
+  kVelocityUp,
+  kRateX,
+  kRateY,
+  kRateZ,
+  kColumns
+};
+constexpr std::array<std::string_view, kColumns> kNames{"sim_time_s",
+                                                        "east_m",
+                                                        "north_m",
+                                                        "up_m",
+                                                        "qw",
+                                                        "qx",
+                                                        "qy",
+                                                        "qz",
+                                                        "frame_number",
+                                                        "fov_h_rad",
+                                                        "gimbal_yaw_rad",
+                                                        "gimbal_pitch_rad",
+                                                        "gimbal_roll_rad",
+                                                        "velocity_east_m_s",
+                                                        "velocity_north_m_s",
+                                                        "velocity_up_m_s",
+                                                        "rate_x_rad_s",
+                                                        "rate_y_rad_s",
+                                                        "rate_z_rad_s"};
 constexpr std::size_t kMandatory = kFrame;
+constexpr std::array kGimbal{kGimbalYaw, kGimbalPitch, kGimbalRoll};
+constexpr std::array kRates{kVelocityEast, kVelocityNorth, kVelocityUp, kRateX, kRateY, kRateZ};
 
 /// Column of a drive of a part.
 struct PartColumn {
@@ -94,6 +136,8 @@ struct PoseCsvReader::Impl {
         return tl::unexpected(std::move(found.error()));
       }
     }
+    if (auto whole = check_group(kGimbal); !whole) return whole;
+    if (auto whole = check_group(kRates); !whole) return whole;
     for (std::size_t i = 0; i < csv.header().size(); ++i) {
       const auto part = part_of_column(csv.header()[i].text);
       if (!part) continue;
@@ -105,6 +149,19 @@ struct PoseCsvReader::Impl {
                                                  csv.header()[i].text));
       }
       part_columns.push_back({i, *part});
+    }
+    return {};
+  }
+  /// Refuses a part of a group. Two of three angles would leave it open whether the third one is 0
+  /// or stays as it is.
+  [[nodiscard]] Result<void> check_group(std::span<const Column> group) const {
+    const auto there = std::ranges::find_if(group, [this](Column c) { return bool(place[c]); });
+    if (there == group.end()) return {};
+    for (const Column column : group) {
+      if (place[column]) continue;
+      return fail(csv.header()[*place[*there]],
+                  fmt::format("column '{}' is missing: it belongs to '{}'", kNames[column],
+                              kNames[*there]));
     }
     return {};
   }
@@ -127,6 +184,59 @@ struct PoseCsvReader::Impl {
     if (value) return *value;
     return fail(
         at, fmt::format("column '{}': {}", kNames[column], physics::not_a_number_text(at.text)));
+  }
+
+  tl::unexpected<Error> out_of_range(Column column, const DecodeFault& fault) const {
+    return fail(cell(column),
+                fmt::format("column '{}': {} is out of range, must be {} to {}", kNames[column],
+                            cell(column).text, fault.lowest, fault.highest));
+  }
+  [[nodiscard]] bool is_empty(Column column) const {
+    return !place[column] || cell(column).text.empty();
+  }
+  [[nodiscard]] bool all_empty(std::span<const Column> group) const {
+    return std::ranges::all_of(group, [this](Column column) { return is_empty(column); });
+  }
+
+  /// Reads field of view and gimbal. Empty cells leave them as they are.
+  Result<void> read_view() {
+    host.fov_h_rad.reset();
+    host.gimbal_rad.reset();
+    DecodeFault fault;
+    if (!is_empty(kFov)) {
+      const auto fov_h_rad = number(kFov);
+      if (!fov_h_rad) return tl::unexpected(fov_h_rad.error());
+      if (check_fov_h(*fov_h_rad, &fault) != DecodeStatus::ok) return out_of_range(kFov, fault);
+      host.fov_h_rad = *fov_h_rad;
+    }
+    if (all_empty(kGimbal)) return {};
+    glm::dvec3 gimbal_rad{0.0};
+    for (std::size_t i = 0; i < kGimbal.size(); ++i) {
+      const auto angle_rad = number(kGimbal[i]);
+      if (!angle_rad) return tl::unexpected(angle_rad.error());
+      // The angles before this one are in range, so that a fault is that of this one.
+      gimbal_rad[static_cast<glm::length_t>(i)] = *angle_rad;
+      if (check_gimbal(gimbal_rad, &fault) != DecodeStatus::ok) {
+        return out_of_range(kGimbal[i], fault);
+      }
+    }
+    host.gimbal_rad = gimbal_rad;
+    return {};
+  }
+
+  /// Reads the rates of the seeker. Empty cells mean that the host does not know them.
+  Result<std::optional<PoseRates>> read_rates() {
+    if (all_empty(kRates)) return std::optional<PoseRates>();
+    PoseRates rates;
+    for (std::size_t i = 0; i < kRates.size(); ++i) {
+      const auto value = number(kRates[i]);
+      if (!value) return tl::unexpected(value.error());
+      const auto axis = static_cast<glm::length_t>(i % 3);
+      (i < 3 ? rates.velocity_world_m_s : rates.angular_rate_body_rad_s)[axis] = *value;
+      DecodeFault fault;
+      if (check_pose({}, rates, &fault) != DecodeStatus::ok) return out_of_range(kRates[i], fault);
+    }
+    return rates;
   }
 
   [[nodiscard]] Result<std::uint64_t> frame_number() const {
@@ -197,8 +307,10 @@ struct PoseCsvReader::Impl {
     // Apply the same rules as to a pose from the wire.
     const physics::Pose pose{{values[kEast], values[kNorth], values[kUp]},
                              {values[kQw], values[kQx], values[kQy], values[kQz]}};
+    const auto rates = read_rates();
+    if (!rates) return tl::unexpected(rates.error());
     v1::Pose message;
-    to_proto(pose, std::nullopt, message);
+    to_proto(pose, *rates, message);
     if (from_proto(message, host.seeker, host.seeker_rates) != DecodeStatus::ok) {
       return fail(
           csv.row()[0],
@@ -208,6 +320,7 @@ struct PoseCsvReader::Impl {
                       values[kQx], values[kQy], values[kQz], physics::limits::kQuaternionNorm.lo,
                       physics::limits::kQuaternionNorm.hi));
     }
+    if (auto view = read_view(); !view) return view;
     if (auto parts = read_parts(); !parts) return parts;
     host.sim_time_ns = sim_time_ns;
     host.frame_number = *frame;

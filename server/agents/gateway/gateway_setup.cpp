@@ -63,6 +63,7 @@ Result<Made> make_cigi(Context& context, const config::DaemonConfig& config,
   options.first_time_ns = config.source.first_time_ns;
   options.scenario = scenario;
   options.is_view_fixed = is_view_fixed(context.cameras);
+  options.picture = &context.picture;
   out.gateway = std::make_unique<CigiHost>(options, std::move(scene), context.counters,
                                            context.gateway_events);
   return out;

@@ -13,6 +13,13 @@ export function colorTable(hex: string): Uint8Array {
   return out;
 }
 
+/** Returns the colours from the last to the first. */
+export function reversed(table: Uint8Array): Uint8Array {
+  const out = new Uint8Array(table.length);
+  for (let i = 0; i < 256; ++i) out.set(table.subarray(4 * i, 4 * i + 4), 4 * (255 - i));
+  return out;
+}
+
 export function cssColor(table: Uint8Array, entry: number): string {
   return `rgb(${table[4 * entry]},${table[4 * entry + 1]},${table[4 * entry + 2]})`;
 }

@@ -2,11 +2,11 @@
 // The operator's console: wires image, limits, probes, strips and commands together.
 
 import { AxesPanel } from "./axes.js";
-import { colorTable, cssColor, PROBE_COLORS } from "./colors.js";
+import { colorTable, cssColor, PROBE_COLORS, reversed } from "./colors.js";
 import { channelName, duration, element, Panels, Toast } from "./display.js";
 import { ImageView, percentiles, Point } from "./image.js";
 import { bindKeys } from "./keys.js";
-import { Answer, Frame, Hello, Link, Status } from "./link.js";
+import { Answer, Frame, Hello, Link, Picture, Status } from "./link.js";
 import { MAX_PROBES, Probes } from "./probes.js";
 import { Series, Strip, ticks } from "./strips.js";
 import { fetchTable, TemperatureTable } from "./temperature.js";
@@ -32,7 +32,9 @@ class Console {
   private kelvins = true;
   private map = "thermal";
   private colors = new Uint8Array(1024);
+  /** Limits are not set by hand. */
   private auto = true;
+  private picture: Picture | null = null;
   private low = 0;
   private high = 1;
   private autoAt = -Infinity;
@@ -89,6 +91,7 @@ class Console {
   status(status: Status): void {
     this.panels.status(status);
     this.axes.take(status.axes);
+    this.takePicture(status.picture);
     const state = !status.running ? "stopped" : status.held ? "held" : "running";
     const pill = element("state");
     pill.textContent = status.ready ? state : "not ready";
@@ -237,6 +240,32 @@ class Console {
 
   // Limits and colours.
 
+  /** What the page follows of a host: all of its wishes, until the operator sets a limit by hand. */
+  private get wish(): Picture | null {
+    return this.auto ? this.picture : null;
+  }
+
+  private takePicture(picture: Picture | null): void {
+    if (JSON.stringify(picture) === JSON.stringify(this.picture)) return;
+    this.picture = picture;
+    const button = element("auto");
+    button.textContent = picture === null ? "Auto" : "Host";
+    button.title = picture === null ? "Limits by percentile (R)" : "The picture as the host wants it (R)";
+    this.pictureChanged();
+  }
+
+  private setAuto(auto: boolean): void {
+    this.auto = auto;
+    this.pictureChanged();
+  }
+
+  private pictureChanged(): void {
+    this.image.blank = this.wish !== null && !this.wish.on;
+    this.findLimits();
+    this.applyMap();
+    this.look();
+  }
+
   private findLimits(): void {
     const frame = this.image.frame;
     if (!this.auto || frame === null) {
@@ -245,6 +274,15 @@ class Console {
     }
     // Only limits that were found count: the first image sets them, however soon it comes.
     this.autoAt = performance.now();
+    const wish = this.wish;
+    const table = this.table;
+    if (wish !== null && !wish.automatic_gain && table !== undefined) {
+      const shown = (kelvin: number) => (this.showsKelvins ? kelvin : table.radianceAt(kelvin));
+      this.low = shown(wish.low_k);
+      this.high = shown(wish.high_k);
+      this.applyLimits();
+      return;
+    }
     const input = (id: string, fallback: number) => {
       const value = Number.parseFloat(element<HTMLInputElement>(id).value);
       return Number.isFinite(value) ? Math.min(Math.max(value, 0), 100) : fallback;
@@ -282,7 +320,7 @@ class Console {
 
   private moveLimit(which: "low" | "high", steps: number): void {
     const step = (this.high - this.low) / 40;
-    this.auto = false;
+    this.setAuto(false);
     if (which === "low") this.low = Math.min(this.low + steps * step, this.high - step);
     else this.high = Math.max(this.high + steps * step, this.low + step);
     this.applyLimits();
@@ -292,7 +330,7 @@ class Console {
   private typeLimit(which: "low" | "high"): void {
     const value = Number.parseFloat(element<HTMLInputElement>(which).value);
     if (Number.isFinite(value) && (which === "low" ? value < this.high : value > this.low)) {
-      this.auto = false;
+      this.setAuto(false);
       this[which] = value;
     } else {
       this.toast.show("the lower limit must be below the upper one", false);
@@ -303,7 +341,8 @@ class Console {
 
   private applyMap(): void {
     if (this.facts === null) return;
-    this.colors = colorTable(this.facts.colors[this.map] ?? this.facts.colors["thermal"]);
+    const colors = colorTable(this.facts.colors[this.map] ?? this.facts.colors["thermal"]);
+    this.colors = this.wish?.black_hot ? reversed(colors) : colors;
     this.image.setColors(this.colors, this.facts.nan_color);
     element("map").textContent = this.map;
     this.drawBar();
@@ -424,9 +463,10 @@ class Console {
   private look(): void {
     const age = (performance.now() - this.frameAt) / 1000;
     const box = element("stale");
-    box.hidden = this.frameAt !== 0 && (age < STALE_S || this.frozen);
+    box.hidden = this.frameAt !== 0 && !this.image.blank && (age < STALE_S || this.frozen);
     if (!this.link.connected) box.textContent = "No connection to emitd. Trying again.";
     else if (this.frameAt === 0) box.textContent = "No frame yet.";
+    else if (this.image.blank) box.textContent = "The host has switched the sensor off.";
     else box.textContent = `No new frame for ${age.toFixed(0)} s.`;
     const first = this.frames[0];
     const rate = this.frames.length > 1 && age < STALE_S
@@ -476,9 +516,7 @@ class Console {
   }
 
   private toggleAuto(): void {
-    this.auto = !this.auto;
-    this.findLimits();
-    this.redraw();
+    this.setAuto(!this.auto);
   }
 
   private nextChannel(step: number): void {
@@ -500,9 +538,7 @@ class Console {
     element("high").onchange = () => this.typeLimit("high");
     for (const id of ["low-percent", "high-percent"]) {
       element(id).onchange = () => {
-        this.auto = true;
-        this.findLimits();
-        this.redraw();
+        this.setAuto(true);
       };
     }
     const overlay = element<HTMLCanvasElement>("overlay");
@@ -538,7 +574,7 @@ class Console {
         { keys: [" ", "f"], label: "Space", help: "Freeze the display, not the run", run: () => this.toggleFreeze() },
         { keys: ["t"], label: "T", help: "Temperature or radiance", run: () => this.toggleQuantity() },
         { keys: ["m"], label: "M", help: "Colour map", run: () => this.toggleMap() },
-        { keys: ["r"], label: "R", help: "Limits by percentile, or keep them", run: () => this.toggleAuto() },
+        { keys: ["r"], label: "R", help: "Limits by percentile or of the host, or keep them", run: () => this.toggleAuto() },
         { keys: ["-"], label: "-  =", help: "Lower limit down, up", run: () => this.moveLimit("low", -1) },
         { keys: ["="], label: "", help: "", run: () => this.moveLimit("low", 1) },
         { keys: [","], label: ",  .", help: "Upper limit down, up", run: () => this.moveLimit("high", -1) },

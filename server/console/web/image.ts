@@ -49,6 +49,8 @@ export class ImageView {
   private readonly textures: WebGLTexture[] = [];
   private readonly nanColor: WebGLUniformLocation | null;
   frame: Frame | null = null;
+  /** Shows black instead of the frame. */
+  blank = false;
   private width = 0;
   private height = 0;
 
@@ -140,7 +142,7 @@ export class ImageView {
   draw(): void {
     const gl = this.gl;
     gl.viewport(0, 0, this.canvas.width, this.canvas.height);
-    if (this.frame === null) {
+    if (this.frame === null || this.blank) {
       gl.clearColor(0, 0, 0, 1);
       gl.clear(gl.COLOR_BUFFER_BIT);
       return;

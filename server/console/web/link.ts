@@ -66,6 +66,15 @@ export interface Axes {
   ticks: [number, number[], number[]][];
 }
 
+/** What a host wants people to see. Its limits have no meaning with automatic gain. */
+export interface Picture {
+  on: boolean;
+  black_hot: boolean;
+  automatic_gain: boolean;
+  low_k: number;
+  high_k: number;
+}
+
 /** Frame number, flags, age at the status in ms; frame time, its deadline, latency, its deadline in us. */
 export type Tick = [number, number, number, number | null, number | null, number | null, number | null];
 
@@ -83,6 +92,7 @@ export interface Status {
   warnings: Warning[];
   agents: { name: string; max_us: number; over: number; busy_s: number }[];
   axes: Axes;
+  picture: Picture | null;
   ticks: Tick[];
 }
 

@@ -244,6 +244,24 @@ TEST(ConsoleState, TellsTheTimesOfAFrameAndItsDeadlines) {
   EXPECT_NE(status.find("\"ticks\":[[9,0,1.0,1500.0,4500.0,2250.0,5000.0]]"), std::string::npos)
       << status;
   EXPECT_NE(status.find("\"running\":true,\"held\":false"), std::string::npos) << status;
+  EXPECT_NE(status.find("\"picture\":null"), std::string::npos) << status;
+}
+
+TEST(ConsoleState, TellsWhatAHostWantsPeopleToSee) {
+  TapRig rig;
+  const auto status = [&] {
+    return console_status(rig.context(), rig.tap(), StatusBoard(), {}, {true, 0, 1});
+  };
+  rig.context().picture.set({true, true, false, 281.5F, 310.25F});
+  EXPECT_NE(status().find("\"picture\":{\"on\":true,\"black_hot\":true,\"automatic_gain\":false,"
+                          "\"low_k\":281.5000,\"high_k\":310.2500}"),
+            std::string::npos)
+      << status();
+  rig.context().picture.set({false, false, true, 0.0F, 0.0F});
+  EXPECT_NE(status().find("\"on\":false,\"black_hot\":false,\"automatic_gain\":true"),
+            std::string::npos);
+  rig.context().picture.clear();
+  EXPECT_NE(status().find("\"picture\":null"), std::string::npos);
 }
 
 }  // namespace

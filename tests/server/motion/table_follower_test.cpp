@@ -115,6 +115,20 @@ class TableFollowerTest : public ::testing::Test {
     ASSERT_EQ(follower_->status().faults, 0);
     take_extremes();
   }
+  /// Says whether an axis is at a limit while the axes set off for a host whose first pose is that
+  /// of 0.5 s, where the heading is 0.84 of the swing.
+  bool is_limited_at_first() {
+    host_speaks_ = false;
+    run(500 * kMs);
+    host_speaks_ = true;
+    bool limited = false;
+    for (int i = 0; i < 100; ++i) {
+      run(kMs);
+      limited = limited || (follower_->status().state == MotionState::capturing &&
+                            (follower_->status().faults & protocol::kMotionLimit) != 0);
+    }
+    return limited;
+  }
   void expect_soft(const Extremes& extremes, std::int64_t what) const {
     EXPECT_LT(extremes.rate_rad_s, kSoftRadS + kSwingRadS) << what;
     EXPECT_LT(extremes.acceleration_rad_s2, 1.01 * kMostRadS2) << what;
@@ -334,6 +348,16 @@ TEST_F(TableFollowerTest, a_swing_beyond_the_travel_is_a_limit_and_stays_within_
     for (const AxisMotion& axis : last_.axes) EXPECT_LE(std::abs(axis.angle_rad), 2.0 + 1e-12);
   }
   EXPECT_TRUE(limited);
+}
+
+TEST_F(TableFollowerTest, a_demand_within_the_travel_is_no_limit_before_the_axes_follow) {
+  swing_rad_ = 0.5;
+  EXPECT_FALSE(is_limited_at_first());
+}
+
+TEST_F(TableFollowerTest, a_demand_beyond_the_travel_is_a_limit_before_the_axes_follow) {
+  swing_rad_ = 3.0;
+  EXPECT_TRUE(is_limited_at_first()) << "they would capture it without an end and a reason";
 }
 
 TEST_F(TableFollowerTest, a_full_circle_beyond_the_travel_comes_back_softly_at_its_other_end) {

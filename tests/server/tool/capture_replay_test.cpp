@@ -160,5 +160,43 @@ TEST_F(CaptureReplay, a_capture_of_the_wire_gives_the_frames_of_the_run) {
   }
 }
 
+/// A table of the host's poses sets zoom and gimbal again where the host has set them.
+TEST_F(CaptureReplay, a_table_of_poses_gives_the_frames_of_the_run_with_zoom_and_gimbal) {
+  std::string world = small_world("per-frame");
+  const std::string size = "width_px = 48\n";
+  world.insert(world.find(size), "fov_h_deg = 30\nfov_h_min_deg = 5\n");
+  folder_.write("world.toml", world);
+  folder_.write("emitd.toml",
+                "scenario = \"world.toml\"\n[pacing]\nmode = \"host-step\"\n"
+                "[host]\nudp = \"127.0.0.1:0\"\n[control]\ntcp = \"127.0.0.1:0\"\n"
+                "[journal]\nfile = \"journal.mcap\"\n");
+  std::string poses =
+      "sim_time_s,east_m,north_m,up_m,qw,qx,qy,qz,fov_h_rad,gimbal_yaw_rad,gimbal_pitch_rad,"
+      "gimbal_roll_rad\n";
+  // The sensor stands 16 m above the road and looks down to the north.
+  const auto row = [&](int second, const std::string& view) {
+    poses += std::to_string(second) +
+             ",0.1,-12.3,16,0.29883623873011983,0.64085638205578580,0.64085638205578580,"
+             "-0.29883623873011983," +
+             view + "\n";
+  };
+  row(0, ",,,");
+  row(1, "0.17453292519943295,,,");
+  row(2, ",0.01,-0.02,0.03333333333333333");
+  row(3, ",,,");
+  row(4, "0.3,0,0,0");
+  folder_.write("poses.csv", poses);
+  const std::vector<std::uint32_t> live = crcs_of(record("poses.csv"));
+  ASSERT_EQ(live.size(), 5U);
+  EXPECT_NE(live[0], live[1]) << "the sensor zooms";
+  EXPECT_NE(live[1], live[2]) << "the gimbal turns";
+  expect_success({"log", "export", "csv", folder_.file("journal.mcap"), "--table", "seeker",
+                  "--out", folder_.file("seeker.csv")});
+  EXPECT_EQ(crcs_of(record("seeker.csv")), live);
+  const ProcessResult replay = expect_success(
+      {"replay", folder_.file("journal.mcap"), "--scenario", folder_.file("world.toml")});
+  EXPECT_THAT(replay.out, HasSubstr("bit-identical"));
+}
+
 }  // namespace
 }  // namespace emit::test

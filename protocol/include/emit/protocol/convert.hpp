@@ -57,6 +57,12 @@ void to_proto(const HostFrameData& frame, v1::HostFrame& out);
 [[nodiscard]] DecodeStatus check_part(const PartCommandData& part,
                                       DecodeFault* fault = nullptr) noexcept;
 
+/// Checks the yaw, pitch and roll of a gimbal, rad, as decode_host_frame() does. RT-safe.
+[[nodiscard]] DecodeStatus check_gimbal(const glm::dvec3& gimbal_rad,
+                                        DecodeFault* fault = nullptr) noexcept;
+/// Checks a horizontal field of view, rad, as decode_host_frame() does. RT-safe.
+[[nodiscard]] DecodeStatus check_fov_h(double fov_h_rad, DecodeFault* fault = nullptr) noexcept;
+
 /// Appends a record header and the message to `out`, ready for a TCP connection (docs/wire.md
 /// section 2).
 void append_control_record(const v1::ControlRecord& message, std::vector<std::byte>& out);

@@ -6,13 +6,18 @@
 #include <span>
 #include <string_view>
 
-/// Codec of FlightGear's "native FDM" datagram, version 24: what a flight dynamics model such as
-/// JSBSim sends so that another program shows its aircraft. docs/net_fdm.md has the offsets. Any
-/// thread. RT-safe.
+/// Codec of FlightGear's "native FDM" datagram: what a flight dynamics model such as JSBSim sends
+/// so that another program shows its aircraft. Versions 24 and 25 are read, and 24 is written.
+/// docs/net_fdm.md has the offsets. Any thread. RT-safe.
 namespace emit::protocol::net_fdm {
 
 inline constexpr std::uint32_t kVersion = 24;
 inline constexpr std::size_t kBytes = 408;
+/// Version of FlightGear 2020.3 and later, which has more about fuel tanks.
+inline constexpr std::uint32_t kTankVersion = 25;
+inline constexpr std::size_t kTankBytes = 552;
+/// Offset of what version 25 has more, and where the rest goes on as in version 24.
+inline constexpr std::size_t kTanksAt = 304;
 
 /// Fields of a datagram that a source of poses needs, in SI units. The wire has feet for velocities
 /// and accelerations.
@@ -46,9 +51,9 @@ struct Fault {
   enum class Kind : std::uint8_t {
     none,
     too_short,   ///< `value` bytes hold no version
-    byte_order,  ///< the version is 24 in little-endian order
-    version,     ///< `value` is the version, which is not 24
-    size,        ///< `value` bytes; version 24 has 408
+    byte_order,  ///< the version is 24 or 25 in little-endian order
+    version,     ///< `value` is the version, which is not 24 or 25
+    size,        ///< `value` bytes; the datagram's version has `lowest`
     field,       ///< `field` is `value`, outside `lowest` to `highest`, or not finite
   };
   Kind kind = Kind::none;
@@ -62,8 +67,8 @@ struct Fault {
 /// Reads a datagram. `state` is written only when the fault is of kind none.
 [[nodiscard]] Fault decode(std::span<const std::byte> datagram, State& state) noexcept;
 
-/// Writes a datagram whose other fields are 0, for tests and tools. Velocities and accelerations
-/// are rounded to float32.
+/// Writes a datagram of version 24 whose other fields are 0, for tests and tools. Velocities and
+/// accelerations are rounded to float32.
 void encode(const State& state, std::span<std::byte, kBytes> datagram) noexcept;
 
 /// Returns the rates about the body's x, y and z axes that the rates of the angles make:

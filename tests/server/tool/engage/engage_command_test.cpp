@@ -13,12 +13,14 @@
 #include <vector>
 
 #include "support/emit_process.hpp"
+#include "support/peers.hpp"
 
 namespace emit::test {
 namespace {
 
 using ::testing::HasSubstr;
-constexpr std::chrono::seconds kEngageLimit{280};
+/// A flight and a study take minutes where other tests run beside them.
+constexpr std::chrono::seconds kEngageLimit{880};
 
 /// The scene is coarse, its history is short, and the image is a part of the usual one, which keeps
 /// llvmpipe quick.
@@ -159,9 +161,12 @@ TEST(CliEngage, TheTrackerStudyMatchesBestWithThermalShadows) {
 
 /// Returns JSBSim's program; "" where there is none.
 std::string jsbsim_program() {
-  const char* const given = std::getenv("TEST_JSBSIM");
-  const std::string program = given != nullptr ? given : "/usr/games/JSBSim";
-  return std::filesystem::exists(program) ? program : "";
+  if (const char* const given = std::getenv("TEST_JSBSIM")) return given;
+  for (const std::filesystem::path& program :
+       {std::filesystem::path("/usr/games/JSBSim"), peers_folder() / "JSBSim"}) {
+    if (std::filesystem::exists(program)) return program;
+  }
+  return "";
 }
 
 using Vector = std::array<double, 3>;
@@ -200,7 +205,7 @@ Vector rotated(const std::map<std::string, double>& row, const Vector& v) {
 
 TEST(CliEngage, FramesShowThePosesOfJsbsim) {
   const std::string program = jsbsim_program();
-  if (program.empty()) GTEST_SKIP() << "JSBSim is missing: set TEST_JSBSIM";
+  if (program.empty()) GTEST_SKIP() << "JSBSim is missing: install_deps.sh --with-peers brings it";
   if (!has_python()) GTEST_SKIP() << "python3-numpy or python3-protobuf is missing";
   const TemporaryFolder folder;
   const ProcessResult result =

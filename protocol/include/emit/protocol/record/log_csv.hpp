@@ -15,7 +15,7 @@ namespace emit::protocol {
 /// Table that a log is exported to. Each has a header row with units in the names, and numbers with
 /// 17 significant digits; simulation times are exact to the nanosecond.
 enum class LogTable : std::uint8_t {
-  seeker,          ///< poses of the seeker that the host sent, as pose logs in CSV have them
+  seeker,          ///< poses and view of the seeker that the host sent, as CSV pose logs have them
   entities,        ///< states of entities that the host sent
   frames,          ///< frames of a journal with flags and the pose of the sensor that they used
   frame_entities,  ///< states of entities as frames used them
