@@ -87,7 +87,8 @@ OpenGrounds::OpenGrounds(std::span<const FosterMaterial> materials, double refer
   std::vector<bool> is_twin(materials.size(), false);
   for (std::size_t m = 0; m < materials.size(); ++m) {
     const FosterMaterial& material = materials[m];
-    if (material.first_twin != 0) is_twin[material.first_twin] = is_twin[material.first_twin + 1] = true;
+    if (material.first_twin != 0)
+      is_twin[material.first_twin] = is_twin[material.first_twin + 1] = true;
     if (material.water_slot < 0 || material.water_shared) continue;
     const FosterMaterial*& owner = owners[static_cast<std::size_t>(material.water_slot)];
     if (owner == nullptr) owner = &material;
@@ -184,8 +185,7 @@ void OpenGrounds::carry(const HistoryInterval& interval, IntervalForcing& out,
   for (std::size_t s = 0; s < water_.size(); ++s) {
     WaterGround& open = state.water[s];
     const WaterGround before = open;
-    const Wetness wetness =
-        carry_water(s, out, interval.begin_ns, rain_mm, open, state.limits);
+    const Wetness wetness = carry_water(s, out, interval.begin_ns, rain_mm, open, state.limits);
     out.begin.wet_frac[s] = wetness.begin_frac;
     out.end.wet_frac[s] = wetness.end_frac;
     // Follow ground that gets less of the rain while it differs.
@@ -270,9 +270,7 @@ OpenGrounds::Wetness OpenGrounds::carry_water(std::size_t slot, const IntervalFo
     return physics::wet_frac(ground.store, water_mm) * factor_of(water_mm);
   };
   // Dew forms on all that is wet.
-  const auto scaled = [](double mm_s, double factor) {
-    return mm_s > 0.0 ? mm_s * factor : mm_s;
-  };
+  const auto scaled = [](double mm_s, double factor) { return mm_s > 0.0 ? mm_s * factor : mm_s; };
   // Let heat and water take turns over short parts of the interval.
   std::size_t level = 0;
   while (level < kFinestLevel && interval.dt_s > kPartS * static_cast<double>(1U << level)) {

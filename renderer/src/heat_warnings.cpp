@@ -37,13 +37,11 @@ std::vector<std::string> per_frame_warnings(const scene::ScenarioDesc& scenario,
     return out;
   }
   const std::string file = scenario.file.string();
-  if (rains &&
-      std::ranges::any_of(geometry.materials, [](const scene::Material& material) {
+  if (rains && std::ranges::any_of(geometry.materials, [](const scene::Material& material) {
         return !scene::water_store_of(material).none();
       })) {
-    out.push_back(
-        fmt::format("{}: thermal.method \"per-frame\" knows no roofs: rain wets all that looks up",
-                    file));
+    out.push_back(fmt::format(
+        "{}: thermal.method \"per-frame\" knows no roofs: rain wets all that looks up", file));
   }
   std::vector<std::string_view> moving;
   for (const scene::ObjectDesc& object : scenario.objects) {
@@ -52,10 +50,10 @@ std::vector<std::string> per_frame_warnings(const scene::ScenarioDesc& scenario,
     }
   }
   if (!moving.empty()) {
-    out.push_back(
-        fmt::format("{}: thermal.method \"per-frame\" gives '{}' the film of scenery in the wind, "
-                    "without {} own speed, recovery temperature and 'air_film'; \"cached\" has them",
-                    file, fmt::join(moving, "', '"), moving.size() == 1 ? "its" : "their"));
+    out.push_back(fmt::format(
+        "{}: thermal.method \"per-frame\" gives '{}' the film of scenery in the wind, "
+        "without {} own speed, recovery temperature and 'air_film'; \"cached\" has them",
+        file, fmt::join(moving, "', '"), moving.size() == 1 ? "its" : "their"));
   }
   return out;
 }

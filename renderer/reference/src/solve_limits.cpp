@@ -51,14 +51,16 @@ std::vector<std::string> weather_limits(const scene::ScenarioDesc& scenario,
   }
   const bool rains = !nodes.empty() && nodes.back().rain_mm > nodes.front().rain_mm;
   if (coldest_rain_k < kSnowAirK) {
-    out.push_back(fmt::format("snowfall: it rains at {:.1f} K: that is snow, which is not modelled "
-                              "and counts as rain",
-                              coldest_rain_k));
+    out.push_back(
+        fmt::format("snowfall: it rains at {:.1f} K: that is snow, which is not modelled "
+                    "and counts as rain",
+                    coldest_rain_k));
   }
   if (wind_m_s > kMostWindMS) {
-    out.push_back(fmt::format("strong_wind: the wind reaches {:.1f} m/s, beyond the measurements of "
-                              "the air film",
-                              wind_m_s));
+    out.push_back(
+        fmt::format("strong_wind: the wind reaches {:.1f} m/s, beyond the measurements of "
+                    "the air film",
+                    wind_m_s));
   }
   std::vector<std::string_view> moist;
   for (const scene::Material& material : geometry.materials) {
@@ -71,17 +73,19 @@ std::vector<std::string> weather_limits(const scene::ScenarioDesc& scenario,
     return !row.relative_humidity_frac;
   });
   if (lacks && !moist.empty()) {
-    out.push_back(fmt::format("humidity_unknown: the weather lacks the humidity that {} needs: 60 % "
-                              "at the mean air counts",
-                              names_of(moist)));
+    out.push_back(
+        fmt::format("humidity_unknown: the weather lacks the humidity that {} needs: 60 % "
+                    "at the mean air counts",
+                    names_of(moist)));
   }
   const std::vector<std::uint32_t> bare = scene::materials_without_rain(scenario.thermal, geometry);
   if (rains && !bare.empty()) {
     std::vector<std::string_view> names;
     for (const std::uint32_t m : bare) names.push_back(geometry.materials[m].name);
-    out.push_back(fmt::format("rain_unknown: it rains on {} without 'water_store_mm', and rain "
-                              "leaves that dry",
-                              names_of(names)));
+    out.push_back(
+        fmt::format("rain_unknown: it rains on {} without 'water_store_mm', and rain "
+                    "leaves that dry",
+                    names_of(names)));
   }
   return out;
 }
@@ -106,14 +110,16 @@ std::vector<std::string> temperature_limits(const scene::ScenarioDesc& scenario,
     const double at_s = static_cast<double>(sim_time_ns) * 1e-9;
     const bool moist = !scene::moisture_of(material).dry() || (rains && may_be_wet(material));
     if (moist && range.first < physics::kZeroCelsiusK) {
-      out.push_back(fmt::format("freezing: '{}' may be wet and goes down to {:.1f} K at {} s: "
-                                "freezing takes no heat here, ice sublimates as water does",
-                                material.name, range.first, at_s));
+      out.push_back(
+          fmt::format("freezing: '{}' may be wet and goes down to {:.1f} K at {} s: "
+                      "freezing takes no heat here, ice sublimates as water does",
+                      material.name, range.first, at_s));
     }
     if (scene::is_snow_or_ice(material) && range.second > physics::kZeroCelsiusK) {
-      out.push_back(fmt::format("melting: '{}' goes up to {:.1f} K at {} s: melting takes no heat "
-                                "here, so that it is too warm",
-                                material.name, range.second, at_s));
+      out.push_back(
+          fmt::format("melting: '{}' goes up to {:.1f} K at {} s: melting takes no heat "
+                      "here, so that it is too warm",
+                      material.name, range.second, at_s));
     }
   }
   return out;

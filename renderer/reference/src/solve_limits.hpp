@@ -12,8 +12,8 @@
 /// Notes about what the formulae for moisture, snow and air leave out of a solution. Setup only.
 namespace emit::reference {
 
-/// Returns the limits that the weather passes with the materials of a scene: snowfall, humidity that
-/// is not stated, wind beyond the measurements of the film, rain on materials without a store.
+/// Returns the limits that the weather passes with the materials of a scene: snowfall, humidity
+/// that is not stated, wind beyond the measurements of the film, rain on materials without a store.
 [[nodiscard]] std::vector<std::string> weather_limits(const scene::ScenarioDesc& scenario,
                                                       const scene::SceneGeometry& geometry,
                                                       std::span<const ClimateNode> nodes);

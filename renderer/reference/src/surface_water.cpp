@@ -183,7 +183,7 @@ double rain_on_face_frac(const SceneInstant& instant, const SurfacePoint& point)
       const double azimuth_rad = 2.0 * physics::kPi * (k + 0.5 * (ring % 2)) / kAzimuths;
       const glm::dvec3 direction = glm::normalize(
           glm::dvec3(tangent * std::cos(azimuth_rad), tangent * std::sin(azimuth_rad), 1.0));
-      // What comes from behind the face counts neither way.
+      // Rays from behind the face count neither way.
       if (!(glm::dot(direction, point.normal) > 0.0)) continue;
       ++rays;
       if (!instant.occluded({point.position_world_m, direction, point.tolerance_m})) ++reach;

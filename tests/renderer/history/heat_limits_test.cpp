@@ -224,7 +224,8 @@ TEST(DryGrounds, AreSkippedWhereNothingWetsThem) {
   followed.update(plan, rainy);
   skipped.update(plan, rainy);
   EXPECT_GT(skipped.intervals().back().end.wet_frac[0], 0.5);
-  EXPECT_EQ(skipped.intervals().back().end.wet_frac[0], followed.intervals().back().end.wet_frac[0]);
+  EXPECT_EQ(skipped.intervals().back().end.wet_frac[0],
+            followed.intervals().back().end.wet_frac[0]);
 }
 
 }  // namespace
