@@ -78,7 +78,12 @@ ROWS = [
          "the scenario asks for.",
          *[(per_minute(f"emitd_{name}_total"), name.removeprefix("frames_").replace("_", " "))
            for name in ("frames_shed", "frames_coarse", "targets_plain", "frames_entities_behind", "frames_warmed_up",
-                        "frames_wet_unknown", "poses_dropped", "device_failures")]),
+                        "poses_dropped", "device_failures")]),
+        ("Heat beyond its formulae, frames per minute", "timeseries", 12, "none", "Moisture, snow and wind that the heat "
+         "model does not hold for. Each frame says degraded.",
+         *[(per_minute(f"emitd_frames_{name}_total"), name.replace("_", " "))
+           for name in ("wet_unknown", "rain_shelter", "snowfall", "freezing", "melting", "humidity_unknown",
+                        "strong_wind")]),
     ]),
     ("Delay", [
         ("Pose to last byte", "timeseries", 8, "s", f"From the arrival of a pose to the last byte of its frame. {BOUND}",

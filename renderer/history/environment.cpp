@@ -112,6 +112,9 @@ physics::Forcing Environment::forcing_at(std::int64_t sim_time_ns,
   physics::Forcing forcing;
   if (after == live_.begin() && table_.empty()) {
     forcing = physics::forcing_from_clear_sky(clear_sky_, place_, sun, epoch_utc_ns_ + sim_time_ns);
+    // The models have a dew point of their own.
+    forcing.stated_vapour_pa = forcing.vapour_pa;
+    forcing.stated_vapour_frac = 1.0;
   } else {
     forcing = after != live_.begin() ? physics::forcing_from_rows({&*(after - 1), 1}, sim_time_ns)
                                      : physics::forcing_from_rows(table_, sim_time_ns);

@@ -12,8 +12,8 @@
 #include <glm/geometric.hpp>
 
 #include "emit/physics/check.hpp"
-#include "emit/physics/climate/soil_share.hpp"
 #include "emit/physics/step_nodes.hpp"
+#include "emit/scene/melting.hpp"
 #include "emit/threads/parallel.hpp"
 
 namespace emit::renderer {
@@ -57,23 +57,6 @@ glm::dvec2 octahedral_from_unit(const glm::dvec3& n) noexcept {
   return p;
 }
 
-/// Returns the states of a steady profile between the surface's first temperature and the base.
-FosterState<double> initial_states(const FosterMaterial& material) noexcept {
-  FosterState<double> x{};
-  const double flux_w_m2 =
-      (material.initial_k - material.base_k) / material.network.resistance_m2k_w();
-  for (std::size_t i = 0; i < material.network.count; ++i) {
-    x[i] = material.network.modes[i].resistance_m2k_w * flux_w_m2;
-  }
-  return x;
-}
-
-physics::FosterSurface<double> surface_of(const FosterMaterial& material,
-                                          double reference_k) noexcept {
-  return physics::foster_surface(material.network, material.emissivity_frac, material.base_k,
-                                 reference_k);
-}
-
 /// Replaces weather that changes within the interval by a line of least squares. The line keeps the
 /// mean, and its slope is limited so that its ends stay among the values that occurred.
 void fit_changes(HistoryInterval& interval, const Environment& environment) noexcept {
@@ -113,6 +96,22 @@ void fit_changes(HistoryInterval& interval, const Environment& environment) noex
 }
 
 }  // namespace
+
+FosterState<double> foster_initial_states(const FosterMaterial& material) noexcept {
+  FosterState<double> x{};
+  const double flux_w_m2 =
+      (material.initial_k - material.base_k) / material.network.resistance_m2k_w();
+  for (std::size_t i = 0; i < material.network.count; ++i) {
+    x[i] = material.network.modes[i].resistance_m2k_w * flux_w_m2;
+  }
+  return x;
+}
+
+physics::FosterSurface<double> foster_surface_of(const FosterMaterial& material,
+                                                 double reference_k) noexcept {
+  return physics::foster_surface(material.network, material.emissivity_frac, material.base_k,
+                                 reference_k);
+}
 
 HistoryInterval interval_between(std::int64_t begin_ns, std::int64_t end_ns,
                                  const Environment& environment) noexcept {
@@ -158,70 +157,9 @@ FosterDrive<double> unshadowed_drive(const SurfaceForcing& f, const FosterMateri
                             .film_w_m2_k = physics::film_w_m2_k(f.film, normal, material.roughness,
                                                                 reference_k + offset_k - f.air_k),
                             .air_offset_k = f.air_k - reference_k};
-  physics::add_moisture(moisture_at(material, f, normal.z), f.moist, short_wave_w_m2, drive);
+  physics::add_moisture(moisture_at(material, f, rain_by_tilt_frac(normal.z)), f.moist,
+                        short_wave_w_m2, drive);
   return drive;
-}
-
-namespace {
-
-/// Returns true if rain on open ground of both materials dries alike. Sheets of any heat capacity
-/// have the same resistance, so that every mode counts.
-bool dry_alike(const FosterMaterial& a, const FosterMaterial& b) noexcept {
-  const auto same_mode = [](const physics::NetworkMode& x, const physics::NetworkMode& y) {
-    return x.tau_s == y.tau_s && x.resistance_m2k_w == y.resistance_m2k_w;
-  };
-  return a.store == b.store && a.moisture == b.moisture && a.roughness == b.roughness &&
-         a.solar_absorptance_frac == b.solar_absorptance_frac &&
-         a.emissivity_frac == b.emissivity_frac && a.base_k == b.base_k &&
-         a.initial_k == b.initial_k && a.body == b.body && a.network.count == b.network.count &&
-         std::ranges::equal(a.network.modes, b.network.modes, same_mode);
-}
-
-/// Returns how little two stores have in common: the capacity by ratio, after the kind.
-double unlikeness(const physics::WaterStore& a, const physics::WaterStore& b) noexcept {
-  return (a.kind != b.kind ? 100.0 : 0.0) + std::abs(std::log(a.capacity_mm / b.capacity_mm));
-}
-
-}  // namespace
-
-void number_water(std::span<FosterMaterial> materials) {
-  std::vector<std::size_t> owners;
-  // Gives a material a slot if there is one for it.
-  const auto place = [&](std::size_t m) {
-    FosterMaterial& material = materials[m];
-    const auto same = std::ranges::find_if(
-        owners, [&](std::size_t owner) { return dry_alike(materials[owner], material); });
-    material.water_shared = same == owners.end() && owners.size() == physics::kWaterSlots;
-    if (material.water_shared) return;
-    material.water_slot = static_cast<int>(same - owners.begin());
-    if (same == owners.end()) owners.push_back(m);
-  };
-  std::vector<std::size_t> means(materials.size());
-  for (std::size_t m = 0; m < means.size(); ++m) means[m] = m;
-  for (std::size_t m = 0; m < materials.size(); ++m) {
-    const std::size_t twin = materials[m].first_twin;
-    if (twin != 0) means[twin] = means[twin + 1] = m;
-  }
-  // Twins get what the materials leave.
-  for (const bool twins : {false, true}) {
-    for (std::size_t m = 0; m < materials.size(); ++m) {
-      if (!materials[m].store.none() && (means[m] != m) == twins) place(m);
-    }
-  }
-  for (const bool twins : {false, true}) {
-    for (std::size_t m = 0; m < materials.size(); ++m) {
-      FosterMaterial& material = materials[m];
-      if (!material.water_shared || (means[m] != m) != twins) continue;
-      if (twins) {
-        material.water_slot = materials[means[m]].water_slot;
-        continue;
-      }
-      const auto most_alike = std::ranges::min_element(owners, {}, [&](std::size_t owner) {
-        return unlikeness(materials[owner].store, material.store);
-      });
-      material.water_slot = static_cast<int>(most_alike - owners.begin());
-    }
-  }
 }
 
 physics::Result<std::vector<FosterMaterial>> foster_materials(
@@ -234,6 +172,7 @@ physics::Result<std::vector<FosterMaterial>> foster_materials(
     entry.roughness = scene::roughness_factor(material.roughness);
     entry.moisture = scene::moisture_of(material);
     entry.store = scene::water_store_of(material);
+    entry.snow_or_ice = scene::is_snow_or_ice(material);
     entry.base_k = material.base_k;
     entry.initial_k = material.initial_k.value_or(options.initial_k);
     if (material.prescribed_k) {
@@ -282,16 +221,29 @@ physics::Result<std::vector<FosterMaterial>> foster_materials(
   return out;
 }
 
+namespace {
+
+std::vector<FosterMaterial> with_surroundings(std::vector<FosterMaterial> materials,
+                                              const FosterMaterial& surroundings) {
+  materials.push_back(surroundings);
+  return materials;
+}
+
+}  // namespace
+
 FosterHistory::FosterHistory(const scene::ScenarioDesc& scenario,
                              std::vector<FosterMaterial> materials, FosterMaterial surroundings,
-                             const Environment& environment, double reference_k)
+                             const Environment& environment, double reference_k,
+                             DryGrounds dry_grounds)
     : materials_(std::move(materials)),
       surroundings_(surroundings),
       reference_k_(reference_k),
       tolerance_k_(std::min(scenario.thermal.tolerance_k, kSurroundingsToleranceK)),
       history_start_ns_(scenario.thermal.history_start_ns),
       spin_up_ns_(std::max<std::int64_t>(scenario.thermal.spin_up_ns, 0)),
-      surroundings_surface_(surface_of(surroundings_, reference_k)),
+      surroundings_surface_(foster_surface_of(surroundings_, reference_k)),
+      grounds_(with_surroundings(materials_, surroundings_), reference_k, tolerance_k_),
+      dry_grounds_(dry_grounds),
       intervals_(scenario.thermal.steps) {
   if (spin_up_ns_ > 0) tail_.resize(kTailSteps);
   if (spin_up_ns_ > kTailNs) {
@@ -300,19 +252,6 @@ FosterHistory::FosterHistory(const scene::ScenarioDesc& scenario,
   }
   nodes_ns_.resize(kSpinUpSteps + 1);
   table_.resize(materials_.size() * grid_nodes_ * grid_nodes_);
-  // Take a material of its own in each slot for its ground.
-  std::array<const FosterMaterial*, physics::kWaterSlots> owners{};
-  for (std::size_t m = 0; m <= materials_.size(); ++m) {
-    const FosterMaterial& material = m < materials_.size() ? materials_[m] : surroundings_;
-    if (material.water_slot < 0 || material.water_shared) continue;
-    const FosterMaterial*& owner = owners[static_cast<std::size_t>(material.water_slot)];
-    if (owner == nullptr) owner = &material;
-  }
-  for (const FosterMaterial* const owner : owners) {
-    if (owner == nullptr) break;
-    water_grounds_.push_back(*owner);
-    water_surfaces_.push_back(surface_of(*owner, reference_k));
-  }
   spin_up_gains_.resize(materials_.size());
   spin_up(environment, [](std::size_t rows, const auto& fill) {
     threads::parallel_parts(rows, 1, [&fill](std::size_t begin, std::size_t end) {
@@ -331,104 +270,14 @@ SurfaceForcing FosterHistory::forcing(const physics::SunPosition& sun,
   return out;
 }
 
-void FosterHistory::carry_water(const HistoryInterval& interval, IntervalForcing& out) noexcept {
-  // Parts last 300 s or less, but for the oldest, longest intervals, which have eight.
-  constexpr double kPartS = 300.0;
-  constexpr std::size_t kFinestLevel = 3;
-  const glm::dvec3 up(0.0, 0.0, 1.0);
-  const double j_kg = physics::vaporisation_j_kg(out.begin.air_k);
-  for (std::size_t s = 0; s < water_grounds_.size(); ++s) {
-    const FosterMaterial& ground = water_grounds_[s];
-    const physics::FosterSurface<double>& surface = water_surfaces_[s];
-    WaterGround& now = ground_.water[s];
-    const double rain_mm = std::max(0.0, interval.rain_mm);
-    const bool wet = rain_mm > 0.0 || now.water_mm > 0.0;
-    // Set up the drive of ground that is as the material states it, and of ground wet all over.
-    const double offset_k = physics::foster_offset_k(now.modes_k, surface);
-    const auto drive = [&](SurfaceForcing f, double wet_frac) {
-      f.wet_frac[s] = wet_frac;
-      return unshadowed_drive(f, ground, up, reference_k_, offset_k);
-    };
-    const auto ladder = physics::foster_ladder(out.dt_s, ground.network);
-    const FosterDrive<double> dry[] = {drive(out.begin, 0.0), drive(out.end, 0.0)};
-    if (!wet) {
-      physics::foster_advance(now.modes_k, dry[0], dry[1], ladder, surface, tolerance_k_);
-      continue;
-    }
-    const FosterDrive<double> open[] = {drive(out.begin, 1.0), drive(out.end, 1.0)};
-    const auto drive_at = [&](double f, double wet_frac) {
-      FosterDrive<double> out_drive = physics::lerp(dry[0], dry[1], f);
-      if (!(wet_frac > 0.0)) return out_drive;
-      const FosterDrive<double> wet_drive = physics::lerp(open[0], open[1], f);
-      out_drive.evaporation_w_m2_pa =
-          std::lerp(out_drive.evaporation_w_m2_pa, wet_drive.evaporation_w_m2_pa, wet_frac);
-      out_drive.dew_w_m2_pa = wet_drive.dew_w_m2_pa;
-      out_drive.vapour_pa = wet_drive.vapour_pa;
-      return out_drive;
-    };
-    const auto open_mm_s = [&](double f) {
-      const double t_k = reference_k_ + physics::foster_offset_k(now.modes_k, surface);
-      return physics::latent_flux(t_k, physics::lerp(open[0], open[1], f)).flux_w_m2 / j_kg;
-    };
-    const auto factor_of = [&](double water_mm) {
-      return physics::warm_soil_factor(ground.store, physics::wet_frac(ground.store, water_mm),
-                                       out.begin.air_k, out.begin.moist);
-    };
-    const auto share_of = [&](double water_mm) {
-      return physics::wet_frac(ground.store, water_mm) * factor_of(water_mm);
-    };
-    // Dew forms on all that is wet.
-    const auto scaled = [](double mm_s, double factor) {
-      return mm_s > 0.0 ? mm_s * factor : mm_s;
-    };
-    // Let heat and water take turns over short parts of the interval.
-    std::size_t level = 0;
-    while (level < kFinestLevel && out.dt_s > kPartS * static_cast<double>(1U << level)) {
-      ++level;
-    }
-    const double parts = static_cast<double>(1U << level);
-    const double begin_frac = share_of(now.water_mm);
-    double evaporated_mm = 0.0;
-    double open_mm = 0.0;
-    for (double part = 0.0; part < parts; ++part) {
-      const double from = part / parts;
-      const double to = (part + 1.0) / parts;
-      const double dt_s = out.dt_s / parts;
-      const double begin_mm_s = open_mm_s(from);
-      const double begin_factor = factor_of(now.water_mm);
-      const double expected_mm = physics::advance_water(ground.store, now.water_mm, rain_mm / parts,
-                                                        scaled(begin_mm_s, begin_factor), dt_s)
-                                     .water_mm;
-      physics::foster_step(now.modes_k, drive_at(from, share_of(now.water_mm)),
-                           drive_at(to, share_of(expected_mm)), ladder.level[level], surface);
-      const double mean_mm_s = 0.5 * (begin_mm_s + open_mm_s(to));
-      const double mean_factor = 0.5 * (begin_factor + factor_of(expected_mm));
-      const physics::StoredWater after = physics::advance_water(
-          ground.store, now.water_mm, rain_mm / parts, scaled(mean_mm_s, mean_factor), dt_s);
-      now.water_mm = after.water_mm;
-      if (mean_mm_s > 0.0) {
-        evaporated_mm += after.evaporated_mm;
-        open_mm += mean_mm_s * dt_s;
-      }
-    }
-    // Give the interval a line whose mean evaporates what has evaporated.
-    const double end_frac = share_of(now.water_mm);
-    const double mean_frac =
-        open_mm > 0.0 ? std::min(1.0, evaporated_mm / open_mm) : 0.5 * (begin_frac + end_frac);
-    const double most = std::min(mean_frac, 1.0 - mean_frac);
-    const double half = std::clamp(0.5 * (end_frac - begin_frac), -most, most);
-    out.begin.wet_frac[s] = mean_frac - half;
-    out.end.wet_frac[s] = mean_frac + half;
-  }
-}
-
 void FosterHistory::carry(const HistoryInterval& interval, double tolerance_k,
                           IntervalForcing& out) noexcept {
   out.begin = forcing(interval.sun_begin, interval.forcing_begin);
   out.end = forcing(interval.sun_end, interval.forcing_end);
   out.dt_s = seconds(interval.begin_ns, interval.end_ns);
   out.rain_mm = interval.rain_mm;
-  carry_water(interval, out);
+  if (follow_) grounds_.carry(interval, out, ground_);
+  grounds_.note_weather(interval, ground_);
   const glm::dvec3 up(0.0, 0.0, 1.0);
   double begin_k = surroundings_.prescribed_k;
   double end_k = surroundings_.prescribed_k;
@@ -460,6 +309,7 @@ void FosterHistory::forcing_over(std::span<const std::int64_t> nodes_ns,
   EMIT_CHECK_OP(out.size() + 1, ==, nodes_ns.size());
   EMIT_DCHECK(std::ranges::is_sorted(nodes_ns));
   ground_ = ground_at_start_;
+  follow_ = dry_grounds_ == DryGrounds::followed || grounds_.needed(environment, {});
   for (std::size_t i = 0; i < out.size(); ++i) {
     carry(interval_between(nodes_ns[i], nodes_ns[i + 1], environment), tolerance_k_, out[i]);
   }
@@ -467,11 +317,10 @@ void FosterHistory::forcing_over(std::span<const std::int64_t> nodes_ns,
 
 void FosterHistory::spin_up_surroundings(const Environment& environment) noexcept {
   ground_ = {};
-  for (std::size_t s = 0; s < water_grounds_.size(); ++s) {
-    ground_.water[s] = {initial_states(water_grounds_[s]), water_grounds_[s].store.initial_mm};
-  }
+  grounds_.start(ground_);
+  follow_ = true;
   ground_.surroundings =
-      surroundings_.prescribed() ? FosterState<double>{} : initial_states(surroundings_);
+      surroundings_.prescribed() ? FosterState<double>{} : foster_initial_states(surroundings_);
   const std::int64_t table_ns =
       history_start_ns_ - std::min(spin_up_ns_, tail_.empty() ? 0 : kTailNs);
   if (!spin_up_.empty()) {
@@ -520,9 +369,9 @@ FosterState<double> FosterHistory::spun_up(std::size_t index,
                                            const glm::dvec3& normal) const noexcept {
   EMIT_DCHECK_OP(index, <, materials_.size());
   const FosterMaterial& material = materials_[index];
-  FosterState<double> x = initial_states(material);
+  FosterState<double> x = foster_initial_states(material);
   if (spin_up_.empty()) return x;
-  const auto surface = surface_of(material, reference_k_);
+  const auto surface = foster_surface_of(material, reference_k_);
   for (std::size_t i = 0; i < spin_up_.size(); ++i) {
     // The film follows the temperature at the start of the step.
     const double offset_k = physics::foster_offset_k(x, surface);
@@ -582,6 +431,7 @@ bool FosterHistory::update(const StepPlan& plan, const Environment& environment)
   }
   ground_ = ground_at_start_;
   const auto intervals = plan.intervals();
+  follow_ = dry_grounds_ == DryGrounds::followed || grounds_.needed(environment, intervals);
   for (std::size_t i = 0; i < intervals.size() && i < intervals_.size(); ++i) {
     carry(intervals[i], tolerance_k_, intervals_[i]);
   }

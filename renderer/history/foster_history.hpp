@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <glm/ext/vector_double3.hpp>
@@ -13,6 +14,7 @@
 #include "emit/scene/scene_desc.hpp"
 #include "history/environment.hpp"
 #include "history/ground_state.hpp"
+#include "history/open_grounds.hpp"
 #include "history/step_plan.hpp"
 
 /// CPU part of the extended thermal model (`thermal.model = "foster"`): the temperature of the
@@ -36,11 +38,19 @@ namespace emit::renderer {
                                                             double reference_k,
                                                             double offset_k) noexcept;
 
-/// Gives the materials that hold water their slots: at first materials that are no twins, then
-/// twins as far as slots are left. What gets none has `water_shared` and the slot of another
-/// material: a twin that of its mean, others that whose store is most alike. Setup only.
-/// @pre the slots are not set, but first_twin is
-void number_water(std::span<FosterMaterial> materials);
+/// Returns the states of a steady profile between the surface's first temperature and the base.
+/// RT-safe.
+[[nodiscard]] physics::FosterState<double> foster_initial_states(
+    const FosterMaterial& material) noexcept;
+/// Returns the surface of a material over its base. RT-safe.
+[[nodiscard]] physics::FosterSurface<double> foster_surface_of(const FosterMaterial& material,
+                                                               double reference_k) noexcept;
+
+/// Grounds that update() follows.
+enum class DryGrounds : std::uint8_t {
+  followed,  ///< dry ones too, since a host may let it rain after the last interval
+  skipped,   ///< those that something may wet or freeze; the others keep their start
+};
 
 /// History of the surroundings' temperature, and table of the states in which unshadowed surfaces
 /// begin the history. Owner: Renderer.
@@ -61,9 +71,11 @@ class FosterHistory {
   /// Runs the spin-up. `materials` are in the order of the scene's shaders; temperatures are
   /// offsets from reference_k. It allocates.
   FosterHistory(const scene::ScenarioDesc& scenario, std::vector<FosterMaterial> materials,
-                FosterMaterial surroundings, const Environment& environment, double reference_k);
+                FosterMaterial surroundings, const Environment& environment, double reference_k,
+                DryGrounds dry_grounds = DryGrounds::followed);
 
   /// Computes the forcing of the plan's intervals. Returns true when the table has changed.
+  /// extend() may follow only if dry grounds are followed.
   bool update(const StepPlan& plan, const Environment& environment) noexcept;
 
   /// Computes the forcing between given instants, from the history's start on. Entry i covers node
@@ -99,6 +111,11 @@ class FosterHistory {
   [[nodiscard]] const GroundState& surroundings() const noexcept { return ground_; }
   /// Restores a state that surroundings() returned.
   void restore_surroundings(const GroundState& state) noexcept { ground_ = state; }
+  /// Returns whether rain wets something here.
+  [[nodiscard]] bool holds_water() const noexcept {
+    return std::ranges::any_of(
+        materials_, [](const FosterMaterial& material) { return material.water_slot >= 0; });
+  }
 
   /// Returns the states of an unshadowed face of materials()[material], with any normal, at the
   /// instant of the table. They come from the full spin-up rather than the table.
@@ -114,9 +131,6 @@ class FosterHistory {
   void spin_up_surroundings(const Environment& environment) noexcept;
   /// Advances the surroundings over one interval and writes its forcing.
   void carry(const HistoryInterval& interval, double tolerance_k, IntervalForcing& out) noexcept;
-  /// Advances heat and water of the grounds over one interval and writes their wetness. Dry grounds
-  /// advance too, since a host may let it rain at any instant.
-  void carry_water(const HistoryInterval& interval, IntervalForcing& out) noexcept;
   [[nodiscard]] SurfaceForcing forcing(const physics::SunPosition& sun,
                                        const physics::Forcing& weather) const noexcept;
 
@@ -129,10 +143,11 @@ class FosterHistory {
   std::uint32_t grid_nodes_ = 2;
 
   physics::FosterSurface<double> surroundings_surface_;
-  GroundState ground_;                         ///< current state
-  GroundState ground_at_start_;                ///< state at the history's start
-  std::vector<FosterMaterial> water_grounds_;  ///< a material of each slot
-  std::vector<physics::FosterSurface<double>> water_surfaces_;
+  GroundState ground_;           ///< current state
+  GroundState ground_at_start_;  ///< state at the history's start
+  OpenGrounds grounds_;
+  DryGrounds dry_grounds_;
+  bool follow_ = true;  ///< carry() advances the grounds
   double surroundings_now_k_ = 0.0;
 
   std::vector<IntervalForcing> spin_up_;  ///< intervals up to the instant of the table

@@ -39,9 +39,9 @@ inline constexpr double kTwinSd = 1.5;
                                                std::span<const FosterMaterial> built);
 
 /// Runs the spin-up with the `materials` of build_foster_materials(). Returns nothing for emit2014.
-[[nodiscard]] std::optional<FosterHistory> make_foster(const scene::ScenarioDesc& scenario,
-                                                       std::vector<FosterMaterial> materials,
-                                                       const Environment& environment,
-                                                       double reference_k);
+[[nodiscard]] std::optional<FosterHistory> make_foster(
+    const scene::ScenarioDesc& scenario, std::vector<FosterMaterial> materials,
+    const Environment& environment, double reference_k,
+    DryGrounds dry_grounds = DryGrounds::followed);
 
 }  // namespace emit::renderer

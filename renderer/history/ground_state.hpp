@@ -4,6 +4,7 @@
 
 #include "emit/physics/climate/surface_water.hpp"
 #include "emit/physics/foster.hpp"
+#include "emit/renderer/heat_limits.hpp"
 
 namespace emit::renderer {
 
@@ -11,13 +12,26 @@ namespace emit::renderer {
 struct WaterGround {
   physics::FosterState<double> modes_k{};
   double water_mm = 0.0;
-};
 
-/// State of the open, level ground around the scene at an instant: that of the surroundings, and
-/// that of the materials which hold water, by slot.
+  bool operator==(const WaterGround&) const = default;
+};
+/// Grounds of the materials that hold water, by slot.
+using WaterGrounds = std::array<WaterGround, physics::kWaterSlots>;
+
+/// Largest number of grounds without a store of water whose temperature is watched, because they
+/// are moist, snow or ice.
+inline constexpr std::size_t kWatchedGrounds = 6;
+
+/// State of the open, level ground around the scene at an instant: that of the surroundings, that
+/// of the materials which hold water, by slot, and that of further ones whose temperature tells
+/// what the formulae leave out.
 struct GroundState {
   physics::FosterState<double> surroundings{};
-  std::array<WaterGround, physics::kWaterSlots> water{};
+  WaterGrounds water{};       ///< with all of the rain
+  WaterGrounds half_water{};  ///< with half of it
+  WaterGrounds sheltered{};   ///< without rain
+  std::array<physics::FosterState<double>, kWatchedGrounds> watched{};
+  HeatLimitTimes limits;
 };
 
 }  // namespace emit::renderer

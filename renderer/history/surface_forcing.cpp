@@ -26,16 +26,11 @@ physics::Result<std::vector<IntervalForcing>> surface_forcing(
     start.thermal.spin_up_ns = 0;
     auto built = build_foster_materials(start, materials);
     if (!built) return tl::unexpected(std::move(built.error()));
-    // No host can send rain here: ground that nothing wets is not followed.
-    if (!environment.rains() && std::ranges::none_of(*built, [](const FosterMaterial& material) {
-          return material.store.initial_mm > 0.0;
-        })) {
-      for (FosterMaterial& material : *built) material.water_slot = -1;
-    }
     const FosterMaterial surroundings = built->back();
     built->pop_back();
-    FosterHistory history(start, std::move(*built), surroundings, environment,
-                          physics::kReferenceK);
+    // No host can send rain here.
+    FosterHistory history(start, std::move(*built), surroundings, environment, physics::kReferenceK,
+                          DryGrounds::skipped);
     history.forcing_over(nodes_ns, environment, out);
     return out;
   }

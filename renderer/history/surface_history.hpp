@@ -43,6 +43,9 @@ class SurfaceHistory {
   /// Restores a state that surroundings() returned.
   void restore_surroundings(const GroundState& state) noexcept;
 
+  /// Returns whether rain wets something here. Nothing with emit2014.
+  [[nodiscard]] bool holds_water() const noexcept { return foster_ && foster_->holds_water(); }
+
   /// Returns the temperature of the surroundings, K; nothing with emit2014.
   [[nodiscard]] std::optional<double> surroundings_now_k() const noexcept;
 

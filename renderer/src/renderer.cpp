@@ -23,6 +23,7 @@
 #include "emit/scene/rain.hpp"
 #include "emit/scene/sheets.hpp"
 #include "gl/egl_context.hpp"
+#include "heat_warnings.hpp"
 #include "history/entity_air.hpp"
 #include "history/first_frame_warnings.hpp"
 #include "history/foster_setup.hpp"
@@ -221,7 +222,7 @@ class GlRenderer final : public Renderer {
   gl::EglContext context_;  ///< declared before every member that owns GL objects
   SceneStats scene_stats_;
   SceneHistory history_;
-  std::uint32_t unknown_wet_ = 0;  ///< materials that do not state what rain does to them
+  bool unknown_wet_ = false;  ///< some material does not state what rain does to it
   std::vector<std::uint32_t> entity_ids_;
   BandModel bands_;
   std::optional<GasModel> gas_;
@@ -294,23 +295,6 @@ std::size_t planes_bytes(const scene::ScenarioDesc& scenario, const OutputOption
   return (bytes + kBlockAlignment - 1) / kBlockAlignment * kBlockAlignment;
 }
 
-/// Returns the warning that rain leaves materials dry, which names what it is due to.
-std::string rain_warning(const scene::ScenarioDesc& scenario, const scene::SceneGeometry& geometry,
-                         std::span<const std::uint32_t> bare) {
-  constexpr const char* kFrames = "frames within six hours of rain carry 'degraded'";
-  const std::string file = scenario.file.string();
-  if (scenario.thermal.model == scene::ThermalModel::emit2014) {
-    return fmt::format(
-        "{}: it rains, but thermal.model \"emit2014\" has no rain: everything stays dry, and {}",
-        file, kFrames);
-  }
-  std::vector<std::string_view> names;
-  for (const std::uint32_t m : bare) names.push_back(geometry.materials[m].name);
-  return fmt::format(
-      "{}: it rains, but '{}' state{} no 'water_store_mm': rain leaves them dry, and {}", file,
-      fmt::join(names, "', '"), names.size() == 1 ? "s" : "", kFrames);
-}
-
 GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext context,
                        const scene::SceneGeometry& geometry, const OutputOptions& output,
                        BandModel bands, std::optional<GasModel> gas, ClutterFields clutter,
@@ -341,10 +325,8 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
   scene_stats_.warnings.insert(scene_stats_.warnings.end(), geometry.warnings.begin(),
                                geometry.warnings.end());
   const std::vector<std::uint32_t> bare = scene::materials_without_rain(scenario.thermal, geometry);
-  unknown_wet_ = static_cast<std::uint32_t>(bare.size());
-  if (!bare.empty() && history_.environment.rains()) {
-    scene_stats_.warnings.push_back(rain_warning(scenario, geometry, bare));
-  }
+  unknown_wet_ = !bare.empty();
+  add_heat_warnings(scenario, geometry, bare, history_.environment.rains(), scene_stats_.warnings);
   if (!scenario.contacts.empty()) {
     scene_stats_.warnings.push_back(fmt::format(
         "{}: [[contact]] is ignored: no body conducts to another here, only in emit solve in three "
@@ -723,12 +705,12 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
   prepare(request, level);
   view.stats.coarse = stage_->coarse_from(request.sensor_pose) || view.stats.rewarm_s > 0.0 ||
                       is_beyond_sensor(fov_of(request));
-  // Half a millimetre dries within six hours by day; by night it may last longer.
-  constexpr std::int64_t kWetNs = 6 * 3'600'000'000'000;
+  view.stats.heat_limits = stage_->heat_limits(request);
   constexpr double kLeastMm = 0.05;
-  const bool rained = history_.environment.rain_mm(request.thermal_time_ns - kWetNs,
-                                                   request.thermal_time_ns) > kLeastMm;
-  view.stats.unknown_wet = rained ? unknown_wet_ : 0;
+  if (unknown_wet_ && history_.environment.rain_mm(request.thermal_time_ns - kLimitMemoryNs,
+                                                   request.thermal_time_ns) > kLeastMm) {
+    add(view.stats.heat_limits, HeatLimit::rain_unknown);
+  }
   view.stats.plain_targets = passes_.targets ? stage_->drawn().lists.plain_targets() : 0;
   bind_frame();
   // Clear the counters, then issue all passes and the read-back.

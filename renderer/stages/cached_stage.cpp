@@ -342,6 +342,29 @@ void CachedStage::prepare(const FrameRequest& request, CameraSetup& camera,
   forcing_now_.environment_k = surface_->surroundings_now_k().value_or(forcing_now_.environment_k);
 }
 
+HeatLimits CachedStage::heat_limits(const FrameRequest& request) const noexcept {
+  HeatLimits out = surface_->ground_now().limits.until(request.thermal_time_ns);
+  const std::int64_t now_ns = request.thermal_time_ns;
+  constexpr double kLeastMm = 0.05;
+  if (!surface_history_.holds_water() ||
+      history_.environment.rain_mm(now_ns - kLimitMemoryNs, now_ns) <= kLeastMm) {
+    return out;
+  }
+  // The shelter from rain was found where entities stood at the warm-up. A way as long as a body or
+  // a turn of 0.1 rad uncovers what it kept dry.
+  constexpr double kHalfTurnCos = 0.99875;
+  const std::vector<EntityAnchor>& anchors = surface_->anchors();
+  for (std::size_t m = 0; m < anchors.size(); ++m) {
+    const physics::Pose now = history_.entities[m].at(request.sim_time_ns).pose;
+    const physics::Pose& then = anchors[m].pose;
+    if (glm::distance(now.position_world_m, then.position_world_m) > anchors[m].radius_m ||
+        std::abs(glm::dot(now.world_from_body, then.world_from_body)) < kHalfTurnCos) {
+      add(out, HeatLimit::rain_shelter);
+    }
+  }
+  return out;
+}
+
 void CachedStage::upload() noexcept {
   drawn_->upload();
   // Send the parts of the samples that changed.

@@ -49,6 +49,7 @@ class CachedStage final : public ThermalStage {
                gpu::FrameParams& frame) noexcept override;
   const physics::SunPosition& sun_now() const noexcept override { return sun_now_; }
   const physics::Forcing& forcing_now() const noexcept override { return forcing_now_; }
+  HeatLimits heat_limits(const FrameRequest& request) const noexcept override;
   void upload() noexcept override;
   void bind() const noexcept override;
   /// False, because a pixel depends on the samples of its own triangle alone.

@@ -221,7 +221,6 @@ void set_foster_forcing(const IntervalForcing& forcing, double reference_k,
 void set_foster_gains(const IntervalForcing& forcing, std::span<const FosterMaterial> materials,
                       std::span<gpu::RelaxationParams> params) noexcept {
   static_assert(EMIT_FOSTER_LEVELS == physics::kMaxFosterLevel);
-  static_assert(EMIT_RAIN_TILT_COSINE == physics::kRainTiltCosine);
   EMIT_CHECK_OP(forcing.dt_s, >=, 0.0);
   EMIT_CHECK_OP(params.size(), ==, materials.size() * EMIT_FOSTER_ENTRIES);
   const auto narrow = [](const physics::FosterState<double>& x) {
@@ -238,9 +237,10 @@ void set_foster_gains(const IntervalForcing& forcing, std::span<const FosterMate
     }
     const int slot = materials[m].water_slot;
     const auto wet = [slot](const SurfaceForcing& f) {
-      return glm::vec4(
-          slot < 0 ? 0.0F : static_cast<float>(f.wet_frac[static_cast<std::size_t>(slot)]), 0.0F,
-          0.0F, 0.0F);
+      if (slot < 0) return glm::vec4(0.0F);
+      const auto s = static_cast<std::size_t>(slot);
+      return glm::vec4(static_cast<float>(f.wet_frac[s]), static_cast<float>(f.half_wet_frac[s]),
+                       static_cast<float>(f.sheltered_wet_frac[s]), 0.0F);
     };
     entries.back() = {wet(forcing.begin), wet(forcing.end)};
   }

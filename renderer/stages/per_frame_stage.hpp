@@ -33,6 +33,9 @@ class PerFrameStage final : public ThermalStage {
                gpu::FrameParams& frame) noexcept override;
   const physics::SunPosition& sun_now() const noexcept override { return plan_.sun_now(); }
   const physics::Forcing& forcing_now() const noexcept override { return forcing_now_; }
+  HeatLimits heat_limits(const FrameRequest& request) const noexcept override {
+    return foster_ ? foster_->surroundings().limits.until(request.thermal_time_ns) : HeatLimits{};
+  }
   void upload() noexcept override;
   void bind() const noexcept override;
   /// True, because the obscurance of a pixel comes from its neighbours.

@@ -99,6 +99,10 @@ class ThermalStage {
   /// prepare().
   [[nodiscard]] virtual const physics::Forcing& forcing_now() const noexcept = 0;
 
+  /// Limits of the formulae that were passed until the thermal instant of the frame, after
+  /// prepare(). Rain on materials without a store is not among them.
+  [[nodiscard]] virtual HeatLimits heat_limits(const FrameRequest& request) const noexcept = 0;
+
   /// Sends the data of the frame to the device.
   virtual void upload() noexcept = 0;
   /// Binds buffers and textures of the method.

@@ -268,6 +268,9 @@ EventText describe_loss(const Event& event, const std::string& text) {
           fmt::format("event=poses_dropped count={} effect=\"oldest motion of this run is kept "
                       "coarser, frames are flagged degraded\" remedy=\"reset the run\"",
                       event.a));
+    case EventKind::heat_limit:
+      return distinct_warn(
+          fmt::format("event=heat_limit why=\"{}\" effect=\"frames are flagged degraded\"", text));
     case EventKind::warmed_up_again:
       return warn(fmt::format(
           "event=warmed_up_again took_s={:.3f} jump_s={:.3f} effect=\"no frame "
@@ -310,6 +313,7 @@ EventText describe(const Event& event) {
     case EventKind::journal_overrun:
     case EventKind::weather_lost:
     case EventKind::poses_dropped:
+    case EventKind::heat_limit:
     case EventKind::warmed_up_again:
       return describe_loss(event, text);
     case EventKind::slots_missed:

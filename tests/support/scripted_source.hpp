@@ -19,6 +19,7 @@ struct SourceScript {
   bool weather_full = false;               ///< apply_weather(): no room
   std::uint64_t dropped_poses = 0;         ///< of every frame's statistics
   bool coarse = false;                     ///< likewise
+  renderer::HeatLimits heat_limits;        ///< likewise
   std::uint32_t plain_targets = 0;         ///< likewise
   std::atomic<bool> device_failed{false};  ///< of every frame collected
   std::atomic<bool> device_lost{false};    ///< likewise
@@ -135,6 +136,7 @@ class ScriptedSource final : public server::FrameSource {
       view.sensor_pose = request.sensor_pose;
       view.stats.dropped_poses = script_.dropped_poses;
       view.stats.coarse = script_.coarse;
+      view.stats.heat_limits = script_.heat_limits;
       view.stats.plain_targets = script_.plain_targets;
       view.quality_level = request.quality_level;
       view.estimated_error_k =

@@ -294,7 +294,8 @@ const KeyTable<Material>& material_keys() {
           "prescribed_k", "K", between(100, 5000), EMIT_FIELD(prescribed_k),
           "Given temperature of a part, such as a hot engine. It has no thermal simulation."),
       text<Material>("family", EMIT_FIELD(family),
-                     "Kind of material, by which `emit materials` groups."),
+                     "Kind of material, by which `emit materials` groups. Dry materials of `water, "
+                     "snow and ice` count as snow or ice (`melting` of frames)."),
       text<Material>("source", EMIT_FIELD(source), "Source of the numbers."),
       spread_key(),
       text<Material>("uncertainty", EMIT_FIELD(uncertainty),

@@ -21,6 +21,7 @@
 #include "emit/threads/parallel.hpp"
 #include "sky_discs.hpp"
 #include "solve_checkpoint.hpp"
+#include "solve_limits.hpp"
 #include "solve_points.hpp"
 #include "solve_radiance.hpp"
 #include "solve_solid.hpp"
@@ -102,6 +103,8 @@ struct SceneSolver::Data {
                                     std::vector<glm::dvec3>& sky_rays) const;
   Result<void> choose_dimension(bool& three);
   void note_interiors_and_parts();
+  void note_temperatures(std::span<const PixelHit> hits, std::span<const double> kelvin,
+                         std::int64_t sim_time_ns);
   Result<void> check_instant(std::int64_t sim_time_ns) const;
   Result<std::vector<double>> temperatures(std::vector<PixelHit>& hits, std::int64_t sim_time_ns);
   std::optional<PixelHit> surface_at(const SceneInstant& instant, const SolveProbe& probe,
@@ -143,6 +146,9 @@ Result<SceneSolver> SceneSolver::create(const scene::ScenarioDesc& scenario,
   auto climate = SurfaceClimate::create(data->scenario, climate_options);
   if (!climate) return tl::unexpected(std::move(climate.error()));
   data->climate.emplace(std::move(*climate));
+  for (std::string& note : weather_limits(data->scenario, geometry, data->climate->nodes())) {
+    data->notes.push_back(std::move(note));
+  }
   for (std::size_t band = 0; band < scenario.bands.size(); ++band) {
     auto made = BandRadiance::create(scenario, band);
     if (!made) return tl::unexpected(std::move(made.error()));
@@ -228,6 +234,24 @@ void SceneSolver::Data::note_interiors_and_parts() {
     if (object.parts.empty()) continue;
     notes.push_back(fmt::format(
         "object '{}': [[object.parts]] has no effect, no part heats itself here", object.name));
+  }
+}
+
+/// Names what is moist and frozen, or snow that should melt, once for each material.
+void SceneSolver::Data::note_temperatures(std::span<const PixelHit> hits,
+                                          std::span<const double> kelvin,
+                                          std::int64_t sim_time_ns) {
+  std::vector<SolvedPlace> places;
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    places.push_back({hits[i].point.material, kelvin[i]});
+  }
+  for (std::string& note : temperature_limits(scenario, geometry, places, sim_time_ns)) {
+    // The text up to the second quote has the limit and the material.
+    const std::string begin = note.substr(0, note.find('\'', note.find('\'') + 1) + 1);
+    if (std::ranges::any_of(notes,
+                            [&](const std::string& told) { return told.starts_with(begin); }))
+      continue;
+    notes.push_back(std::move(note));
   }
 }
 
@@ -538,6 +562,7 @@ Result<SolvedImage> SceneSolver::image(const SolveView& view) {
               .value_frac;
     });
   }
+  d.note_temperatures(hits, kelvin, view.sim_time_ns);
   // Write the temperatures and the radiance.
   for (std::size_t i = 0; i < hits.size(); ++i) {
     image.temperature_k[hits[i].pixel] = static_cast<float>(kelvin[i]);
@@ -585,6 +610,7 @@ Result<std::vector<ProbedPoint>> SceneSolver::probe(std::span<const SolveProbe> 
   const auto kelvin = d.temperatures(hits, sim_time_ns);
   if (!kelvin) return tl::unexpected(kelvin.error());
   for (std::size_t i = 0; i < hits.size(); ++i) points[hits[i].pixel].temperature_k = (*kelvin)[i];
+  d.note_temperatures(hits, *kelvin, sim_time_ns);
   return points;
 }
 

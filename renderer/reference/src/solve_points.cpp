@@ -10,8 +10,10 @@
 #include <glm/gtc/quaternion.hpp>
 #include <limits>
 #include <map>
+#include <optional>
 #include <utility>
 
+#include "emit/reference/surface_water.hpp"
 #include "emit/threads/parallel.hpp"
 #include "solve_sight.hpp"
 
@@ -275,7 +277,15 @@ class PointHistories::Run {
     const auto solver = mine.try_emplace(point.material, all_.climate_, meshes_.at(point.material),
                                          material, all_.scenario_.thermal.initial_k)
                             .first;
-    solver->second.run(point.normal, {front, back}, times_ns, out_k);
+    // Rain counts with what stands above the point at the instant of the solution.
+    const bool dry = scene::water_store_of(material).none();
+    const auto rain_frac = [&](const glm::dvec3& normal) -> std::optional<double> {
+      if (dry) return std::nullopt;
+      return rain_on_face_frac(instants_.back(), {point.position_world_m, normal, 1e-9});
+    };
+    solver->second.run(point.normal,
+                       {front, back, rain_frac(point.normal), rain_frac(-point.normal)}, times_ns,
+                       out_k);
     return front;
   }
 

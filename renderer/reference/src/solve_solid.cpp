@@ -152,9 +152,14 @@ SolidRadiation::SolidRadiation(const VoxelModel& model, const SolidSolver& solve
     if (scene::water_store_of(material).none()) continue;
     if (const auto mesh = material_mesh(material)) {
       water_.back() =
-          water_course(climate.nodes(), material, material.initial_k.value_or(thermal.initial_k),
-                       climate.surroundings_reflectance_frac(), *mesh);
+          RainCourses(climate.nodes(), material, material.initial_k.value_or(thermal.initial_k),
+                      climate.surroundings_reflectance_frac(), *mesh);
     }
+  }
+  rain_frac_.resize(surfaces_.size(), 0.0);
+  for (std::size_t f = 0; f < surfaces_.size(); ++f) {
+    if (water_[face_material_[f]].empty() || surfaces_[f].enclosed) continue;
+    rain_frac_[f] = rain_on_face_frac(instant, {surfaces_[f].centre_m, surfaces_[f].normal, 1e-9});
   }
   exchange_ = std::make_unique<SceneExchange>(faces, surfaces_, finder_, instant, options.rays);
   sun_ = std::make_unique<SunOnFaces>(faces, surfaces_);
@@ -191,8 +196,6 @@ void SolidRadiation::drive(double time_s, std::span<const double> face_k, const 
   }
   // Set the drive of every face, with the film at its temperature now.
   const physics::AirFilm film = physics::air_film(now.flow);
-  wet_frac_.resize(water_.size());
-  for (std::size_t m = 0; m < water_.size(); ++m) wet_frac_[m] = water_[m].at(ns(time_s));
   const double cavity4 = std::pow(model_.cavity_k(), 4);
   for (std::size_t f = 0; f < n; ++f) {
     const ExchangeFace& s = surfaces_[f];
@@ -200,9 +203,8 @@ void SolidRadiation::drive(double time_s, std::span<const double> face_k, const 
         s.enclosed ? 0.0 : physics::film_w_m2_k(film, s.normal, s.roughness, face_k[f] - now.air_k);
     out.air_k[f] = now.air_k;
     physics::MoistSurface moisture = moisture_[f];
-    // Rain wets what does not stand upright.
-    constexpr double kSteepestUp = 0.17;
-    if (s.normal.z > kSteepestUp) moisture.film_frac = wet_frac_[face_material_[f]];
+    const RainCourses& water = water_[face_material_[f]];
+    if (!water.empty()) moisture.film_frac = water.at(ns(time_s), rain_frac_[f]);
     if (!s.enclosed && !moisture.dry()) {
       add_latent(now, moisture, direct_w_m2_[f] + incoming_[f].shortwave_w_m2, face_k[f],
                  out.film_w_m2_k[f], out.air_k[f]);

@@ -55,14 +55,14 @@ class SolidRadiation {
   std::vector<ExchangeFace> surfaces_;
   std::vector<std::uint32_t> face_material_;
   std::vector<physics::MoistSurface> moisture_;  ///< by face
-  std::vector<WaterCourse> water_;               ///< by material
+  std::vector<RainCourses> water_;               ///< by material
   FaceFinder finder_;
   std::unique_ptr<SceneExchange> exchange_;
   std::unique_ptr<SunOnFaces> sun_;
   std::vector<double> sun_frac_, direct_w_m2_;
   std::vector<Incoming> incoming_;
-  std::vector<double> wet_frac_;  ///< of level ground, by material
-  double left_w_m2_ = 0.0;        ///< greatest result of SceneExchange::incoming()
+  std::vector<double> rain_frac_;  ///< share of the rain that a face gets
+  double left_w_m2_ = 0.0;         ///< greatest result of SceneExchange::incoming()
 };
 
 /// History of a voxel model under a scenario's forcing. It has a spin-up on a coarse grid, then one

@@ -130,14 +130,7 @@ FaceState face_state(const ClimateNode& climate, const SurfaceOptics& surface,
                      .pressure_pa = climate.flow.pressure_pa,
                      .wetness_frac = surface.moisture.wetness_frac,
                      .resistance_s_m = light_resistance_s_m(surface.moisture, shortwave)};
-    // Rain wets what does not stand upright.
-    constexpr double kSteepestUp = 0.17;
-    const double up = surface.normal.z;
-    if (surface.both_sides) {
-      out.moisture->film_frac = std::abs(up) > kSteepestUp ? 0.5 * climate.wet_frac : 0.0;
-    } else if (up > kSteepestUp) {
-      out.moisture->film_frac = climate.wet_frac;
-    }
+    out.moisture->film_frac = climate.wet_frac;
   }
   return out;
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 
 #include "emit/physics/constants.hpp"
 
@@ -83,10 +84,10 @@ Stretch later(const WaterStore& store, double water_mm, double rain_mm_s, double
 
 WaterCourse water_course(std::span<const ClimateNode> nodes, const scene::Material& material,
                          double initial_k, double surroundings_reflectance_frac,
-                         const LayerMesh& mesh, const StepOptions& steps) {
+                         const LayerMesh& mesh, const StepOptions& steps, double rain_frac) {
   const WaterStore store = scene::water_store_of(material);
   WaterCourse out;
-  const double rain_mm = nodes.back().rain_mm - nodes.front().rain_mm;
+  const double rain_mm = rain_frac * (nodes.back().rain_mm - nodes.front().rain_mm);
   if (store.none() || !(rain_mm > 0.0 || store.initial_mm > 0.0)) return out;
   const SurfaceOptics surface{{0.0, 0.0, 1.0},
                               material.solar_absorptance_frac,
@@ -123,7 +124,7 @@ WaterCourse water_course(std::span<const ClimateNode> nodes, const scene::Materi
     const ClimateNode& b = nodes[i + 1];
     const double dt_s = static_cast<double>(b.time_ns - a.time_ns) * 1e-9;
     if (dt_s > 0.0) {
-      const double rain_mm_s = (b.rain_mm - a.rain_mm) / dt_s;
+      const double rain_mm_s = rain_frac * (b.rain_mm - a.rain_mm) / dt_s;
       const double begin_mm_s = open_mm_s(a);
       const double expected_mm =
           later(store, water_mm, rain_mm_s, begin_mm_s, begin_mm_s, dt_s, a).water_mm;
@@ -139,6 +140,56 @@ WaterCourse water_course(std::span<const ClimateNode> nodes, const scene::Materi
     keep(b);
   }
   return out;
+}
+
+RainCourses::RainCourses(std::span<const ClimateNode> nodes, const scene::Material& material,
+                         double initial_k, double surroundings_reflectance_frac,
+                         const LayerMesh& mesh, const StepOptions& steps) {
+  for (std::size_t i = 0; i < courses_.size(); ++i) {
+    const double rain_frac = static_cast<double>(i) / static_cast<double>(courses_.size() - 1);
+    courses_[i] = water_course(nodes, material, initial_k, surroundings_reflectance_frac, mesh,
+                               steps, rain_frac);
+  }
+}
+
+double RainCourses::between(double rain_frac, const auto& wetness_of) const noexcept {
+  const double place = std::clamp(rain_frac, 0.0, 1.0) * static_cast<double>(courses_.size() - 1);
+  const auto low = std::min(static_cast<std::size_t>(place), courses_.size() - 2);
+  const double share = place - static_cast<double>(low);
+  return (1.0 - share) * wetness_of(courses_[low]) + share * wetness_of(courses_[low + 1]);
+}
+
+double RainCourses::at_node(std::size_t node, double rain_frac) const noexcept {
+  return between(rain_frac, [node](const WaterCourse& course) {
+    return course.empty() ? 0.0 : course.wet_frac[node];
+  });
+}
+
+double RainCourses::at(std::int64_t at_ns, double rain_frac) const noexcept {
+  return between(rain_frac, [at_ns](const WaterCourse& course) { return course.at(at_ns); });
+}
+
+double rain_on_face_frac(const SceneInstant& instant, const SurfacePoint& point) {
+  if (!(point.normal.z > 0.0)) return 0.0;
+  constexpr double kConeRad = 20.0 * physics::kDegree;
+  constexpr int kRings = 8;
+  constexpr int kAzimuths = 8;
+  int reach = 0;
+  int rays = 0;
+  for (int ring = 0; ring < kRings; ++ring) {
+    // Rings of a level plane above the point have equal areas.
+    const double tangent = std::tan(kConeRad) * std::sqrt((ring + 0.5) / kRings);
+    for (int k = 0; k < kAzimuths; ++k) {
+      const double azimuth_rad = 2.0 * physics::kPi * (k + 0.5 * (ring % 2)) / kAzimuths;
+      const glm::dvec3 direction = glm::normalize(
+          glm::dvec3(tangent * std::cos(azimuth_rad), tangent * std::sin(azimuth_rad), 1.0));
+      // Rays from behind the face count neither way.
+      if (!(glm::dot(direction, point.normal) > 0.0)) continue;
+      ++rays;
+      if (!instant.occluded({point.position_world_m, direction, point.tolerance_m})) ++reach;
+    }
+  }
+  return rays == 0 ? point.normal.z : point.normal.z * reach / rays;
 }
 
 double WaterCourse::at(std::int64_t at_ns) const noexcept {

@@ -27,9 +27,13 @@ vec4 foster_start_frac(int entry) { return texelFetch(relaxation_table, entry * 
 // Gains of the four modes of foster for the flux at the end of a step.
 vec4 foster_end_frac(int entry) { return texelFetch(relaxation_table, entry * 2 + 1); }
 
-// foster: share of a face that rain has wetted, at the start and the end of an interval. Walls and undersides stay dry.
+// foster: share of a face that rain has wetted, at the start and the end of an interval. Rain falls straight down, and
+// nothing above the face keeps it off. The table has ground with all of the rain, half of it, and none.
 vec2 rain_wet_frac(int entry, float up) {
-  if (!(up > EMIT_RAIN_TILT_COSINE)) return vec2(0.0);
   int at = (entry + EMIT_FOSTER_ENTRIES - 1) * 2;
-  return vec2(texelFetch(relaxation_table, at).x, texelFetch(relaxation_table, at + 1).x);
+  vec3 begin = texelFetch(relaxation_table, at).xyz;
+  vec3 end = texelFetch(relaxation_table, at + 1).xyz;
+  float halves = 2.0 * clamp(up, 0.0, 1.0);
+  return halves < 1.0 ? mix(vec2(begin.z, end.z), vec2(begin.y, end.y), halves)
+                      : mix(vec2(begin.y, end.y), vec2(begin.x, end.x), halves - 1.0);
 }

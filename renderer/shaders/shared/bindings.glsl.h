@@ -135,7 +135,5 @@
 
 // foster: the finest split of an interval has 2 to this power parts.
 #define EMIT_FOSTER_LEVELS 6
-// foster: vertical part of the normal of the steepest face that rain wets.
-#define EMIT_RAIN_TILT_COSINE 0.17
 // foster: entries of the relaxation table per material: one for each split, and the wetness.
 #define EMIT_FOSTER_ENTRIES (EMIT_FOSTER_LEVELS + 2)

@@ -114,12 +114,12 @@ FosterHeat::FilmSpan FosterHeat::film_over(const SampleAdvance& each,
   const double excess_k = reference_k_ + offset_k(sample.material, *each.state) - out.begin.air_k;
   const double roughness = materials_[sample.material].roughness;
   const int slot = materials_[sample.material].water_slot;
-  const auto add_face = [&](const glm::dvec3& normal, double share_frac) {
+  const auto add_face = [&](const glm::dvec3& normal, double open_rain_frac, double share_frac) {
     if (slot >= 0) {
       const auto s = static_cast<std::size_t>(slot);
-      out.begin.wet_frac +=
-          share_frac * physics::face_wet_frac(forcing.begin.wet_frac[s], normal.z);
-      out.end.wet_frac += share_frac * physics::face_wet_frac(forcing.end.wet_frac[s], normal.z);
+      const double rain_frac = open_rain_frac * rain_by_tilt_frac(normal.z);
+      out.begin.wet_frac += share_frac * forcing.begin.wet_frac_at(s, rain_frac);
+      out.end.wet_frac += share_frac * forcing.end.wet_frac_at(s, rain_frac);
     }
     const double natural = physics::natural_film_w_m2_k(begin, normal.z, excess_k);
     out.begin.film_w_m2_k +=
@@ -132,12 +132,12 @@ FosterHeat::FilmSpan FosterHeat::film_over(const SampleAdvance& each,
   // Take the mean of both faces of a sheet. A covered face has no film, so the open one counts.
   const glm::dvec3 normal(each.normal);
   if (each.back == nullptr || each.back->sample.covered) {
-    add_face(normal, 1.0);
+    add_face(normal, sample.rain_frac, 1.0);
   } else if (sample.covered) {
-    add_face(-normal, 1.0);
+    add_face(-normal, each.back->sample.rain_frac, 1.0);
   } else {
-    add_face(normal, 0.5);
-    add_face(-normal, 0.5);
+    add_face(normal, sample.rain_frac, 0.5);
+    add_face(-normal, each.back->sample.rain_frac, 0.5);
   }
   return out;
 }

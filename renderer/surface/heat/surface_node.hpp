@@ -103,10 +103,19 @@ template <class T>
                                          double frac) noexcept {
   GroundState out;
   out.surroundings = between(a.surroundings, b.surroundings, frac);
-  for (std::size_t s = 0; s < out.water.size(); ++s) {
-    out.water[s].modes_k = between(a.water[s].modes_k, b.water[s].modes_k, frac);
-    out.water[s].water_mm = between(a.water[s].water_mm, b.water[s].water_mm, frac);
+  for (WaterGrounds GroundState::*grounds :
+       {&GroundState::water, &GroundState::half_water, &GroundState::sheltered}) {
+    for (std::size_t s = 0; s < out.water.size(); ++s) {
+      const WaterGround& from = (a.*grounds)[s];
+      const WaterGround& to = (b.*grounds)[s];
+      (out.*grounds)[s] = {between(from.modes_k, to.modes_k, frac),
+                           between(from.water_mm, to.water_mm, frac)};
+    }
   }
+  for (std::size_t g = 0; g < out.watched.size(); ++g) {
+    out.watched[g] = between(a.watched[g], b.watched[g], frac);
+  }
+  out.limits = a.limits;
   return out;
 }
 [[nodiscard]] inline physics::CellState<float> between(const physics::CellState<float>& a,

@@ -55,6 +55,9 @@ struct SurfaceSample {
   /// in it that depends on the zenith (sky_past_hull()). Static samples keep the defaults.
   float hull_open_frac = 1.0F;
   glm::vec3 hull_tilt_frac{0.0F};
+  /// Share of the rain that nothing above keeps off, by the rays of the warm-up. The tilt of the
+  /// sample is not in it, because that of entities changes.
+  float rain_frac = 1.0F;
   std::uint32_t first_seen = 0;  ///< rest of the hemisphere: entries of SurfaceSamples::seen
   std::uint32_t seen_count = 0;
   /// Factor on the weights of those entries. Samples with a similar view share the entries and

@@ -115,6 +115,9 @@ class CachedSurface {
   [[nodiscard]] std::optional<double> surroundings_now_k() const noexcept {
     return nodes_.surroundings_k(fraction_);
   }
+  /// Returns the open grounds at the end of the interval that holds the latest instant.
+  /// @pre prepare()
+  [[nodiscard]] const GroundState& ground_now() const noexcept { return nodes_[1].surroundings; }
   /// Returns true while some samples lack a change of the weather by the host that matters.
   [[nodiscard]] bool lags() const noexcept { return lags_; }
   /// Returns true while heat between columns is off by more than kMostColumnErrorK, because its

@@ -82,6 +82,7 @@ requires std::same_as<std::remove_const_t<T>, SurfaceSample>
 void visit_members(T& s, const Visit& visit) {
   visit(s.position_m), visit(s.normal), visit(s.entity), visit(s.body), visit(s.material),
       visit(s.sky_frac), visit(s.sphere_sky_frac), visit(s.hull_open_frac), visit(s.hull_tilt_frac);
+  visit(s.rain_frac);
   visit(s.far_frac), visit(s.first_seen), visit(s.seen_count), visit(s.seen_scale);
   visit(s.covered);
   visit(s.open_frac), visit(s.open_before_frac), visit(s.flat_m), visit(s.facet_m);

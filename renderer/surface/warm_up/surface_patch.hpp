@@ -155,6 +155,10 @@ class PatchSampler {
   /// Finds the shares of sky and surroundings of a sample by rays, and whether it is covered.
   void look_around(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand) const;
 
+  /// Returns the share of the rain around the vertical that nothing above a point keeps off.
+  [[nodiscard]] float rain_share(const ViewPoint& point,
+                                 const CasterSelection& selection) const noexcept;
+
   /// Finds the faces that fill the part of the hemisphere which is not open.
   void look_at_faces(SurfacePatch& patch, std::uint32_t index, const ViewPoint& point,
                      const CasterSelection& selection) const;
@@ -172,6 +176,7 @@ class PatchSampler {
   SphereSampler sphere_;
   SunTracer tracer_;
   double history_s_ = 0.0;
+  std::array<glm::vec3, CasterRays::kMaxRays> rain_from_{};  ///< directions, of even weight
   std::vector<float> diffusivity_m2_s_;  ///< diffusivity of the first layer, by material
   std::vector<float> sky_limit_frac_;    ///< by material: difference up to which shares are alike
 };

@@ -70,6 +70,7 @@ bool RenderAgent::take_job() noexcept {
       source_->reset();
       weather_lost_ = false;
       dropped_poses_ = 0;
+      heat_limits_.reset();
       break;
     case RenderJob::Kind::frame: {
       if (count_ == kDepth) {
@@ -226,6 +227,23 @@ void RenderAgent::note_dropped_poses(std::uint64_t in_run) noexcept {
   dropped_poses_ = in_run;
 }
 
+void RenderAgent::note_heat_limits(const renderer::HeatLimits& limits) noexcept {
+  // The counters are in the order of renderer::HeatLimit.
+  static constexpr std::array<Counter, renderer::kHeatLimits> kCounters{
+      Counter::frames_wet_unknown, Counter::frames_rain_shelter, Counter::frames_snowfall,
+      Counter::frames_freezing,    Counter::frames_melting,      Counter::frames_humidity_unknown,
+      Counter::frames_strong_wind};
+  if (limits.none()) return;
+  for (std::size_t i = 0; i < renderer::kHeatLimits; ++i) {
+    if (!limits[i]) continue;
+    context_.counters.add(kCounters[i]);
+    if (heat_limits_[i]) continue;
+    heat_limits_[i] = true;
+    context_.render_events.push(EventKind::heat_limit, i, 0,
+                                renderer::text_of(static_cast<renderer::HeatLimit>(i)));
+  }
+}
+
 void RenderAgent::note_device(const renderer::FrameView& view) noexcept {
   if (!view.device_failed) {
     failures_ = 0;
@@ -307,14 +325,14 @@ void RenderAgent::finish_shot(InFlight& frame, std::size_t camera, RenderDone& d
   image.readback_end_ns = done.readback_end_ns;
   image.nonfinite_px = view.stats.nonfinite_px;
   image.clamped_px = view.stats.clamped_px;
-  image.coarse = view.stats.coarse || view.stats.plain_targets > 0 || view.stats.unknown_wet > 0;
+  image.coarse = view.stats.coarse || view.stats.plain_targets > 0 || view.stats.heat_limits.any();
   done.nonfinite_px += view.stats.nonfinite_px;
   done.clamped_px += view.stats.clamped_px;
   done.dropped_poses = view.stats.dropped_poses;
   note_dropped_poses(view.stats.dropped_poses);
   done.coarse = done.coarse || image.coarse;
   if (view.stats.coarse) context_.counters.add(Counter::frames_coarse);
-  if (view.stats.unknown_wet > 0) context_.counters.add(Counter::frames_wet_unknown);
+  note_heat_limits(view.stats.heat_limits);
   context_.counters.add(Counter::targets_plain, view.stats.plain_targets);
   // The level of the image that lost most stands for the frame.
   if (view.quality_level >= done.quality_level) {

@@ -99,6 +99,8 @@ class RenderAgent final : public Agent {
   void apply_weather(const RenderJob& job) noexcept;
   void apply_parts(const RenderJob& job) noexcept;
   void note_dropped_poses(std::uint64_t in_run) noexcept;
+  /// Counts the limits that the heat of a picture has passed, and tells each once in a run.
+  void note_heat_limits(const renderer::HeatLimits& limits) noexcept;
   void note_device(const renderer::FrameView& view) noexcept;
   /// Sets Context::device_lost, upon which the daemon ends. No frame comes any more.
   void lose_device(std::string_view why) noexcept;
@@ -119,8 +121,9 @@ class RenderAgent final : public Agent {
   bool starved_ = false;
   /// Thermal clock of the frame submitted last; a reset of the run does not move the surface.
   std::optional<std::int64_t> last_thermal_ns_;
-  bool weather_lost_ = false;        // said so for this run
-  std::uint64_t dropped_poses_ = 0;  // counted in this run
+  bool weather_lost_ = false;         // said so for this run
+  std::uint64_t dropped_poses_ = 0;   // counted in this run
+  renderer::HeatLimits heat_limits_;  // told in this run
   bool job_prepared_ = false;  // entities of the job in front are applied; only submit is missing
 };
 

@@ -67,8 +67,9 @@ physics::FosterDrive<double> drive(const SurfaceForcing& f, const PointView& vie
       .film_w_m2_k = physics::film_w_m2_k(f.film, view.normal, material.roughness,
                                           physics::kReferenceK + offset_k - f.air_k),
       .air_offset_k = f.air_k - physics::kReferenceK};
-  physics::add_moisture(renderer::moisture_at(material, f, view.normal.z), f.moist, short_wave_w_m2,
-                        out);
+  physics::add_moisture(
+      renderer::moisture_at(material, f, renderer::rain_by_tilt_frac(view.normal.z)), f.moist,
+      short_wave_w_m2, out);
   return out;
 }
 

@@ -331,12 +331,14 @@ void Rendering::print_warnings(const renderer::FrameView& view) const {
                     "per pixel",
                     frame, view.stats.plain_targets));
   }
-  if (view.stats.unknown_wet > 0) {
-    warn(fmt::format("{}{} materials are shown dry after rain, because {}", frame,
-                     view.stats.unknown_wet,
-                     scenario_.thermal.model == scene::ThermalModel::emit2014
-                         ? "thermal.model \"emit2014\" has no rain"
-                         : "they state no store of water"));
+  for (std::size_t i = 0; i < renderer::kHeatLimits; ++i) {
+    if (!view.stats.heat_limits[i]) continue;
+    const auto limit = static_cast<renderer::HeatLimit>(i);
+    const bool no_rain = limit == renderer::HeatLimit::rain_unknown &&
+                         scenario_.thermal.model == scene::ThermalModel::emit2014;
+    warn(fmt::format("{}{}: {}", frame, renderer::name_of(limit),
+                     no_rain ? "it rained, and thermal.model \"emit2014\" has no rain"
+                             : renderer::text_of(limit)));
   }
 }
 
@@ -359,7 +361,12 @@ Json Rendering::frame_json(double time_s, std::size_t band, const renderer::Fram
   json.set("nonfinite_px", view.stats.nonfinite_px);
   json.set("clamped_px", view.stats.clamped_px);
   json.set("plain_targets", view.stats.plain_targets);
-  json.set("unknown_wet", view.stats.unknown_wet);
+  Json limits = Json::array();
+  for (std::size_t i = 0; i < renderer::kHeatLimits; ++i) {
+    if (!view.stats.heat_limits[i]) continue;
+    limits.push(Json(std::string(renderer::name_of(static_cast<renderer::HeatLimit>(i)))));
+  }
+  json.set("heat_limits", std::move(limits));
   json.set("radiance", plane_json(view.radiance_w_m2_sr[band]));
   if (!view.temperature_k.empty()) {
     const auto sky =

@@ -317,9 +317,15 @@ physics::Result<void> Solving::run(const scene::SceneGeometry& geometry) {
   if (!solver) return tl::unexpected(std::move(solver.error()));
   solver_.emplace(std::move(*solver));
   times_.setup_s = seconds_since(start);
-  for (const std::string& note : solver_->report().notes) warn(note);
+  std::size_t told = 0;
+  const auto tell = [&] {
+    const std::vector<std::string> notes = solver_->report().notes;
+    for (; told < notes.size(); ++told) warn(notes[told]);
+  };
+  tell();
   for (const double time_s : plan_.times_s) {
     if (auto done = solve_instant(time_s); !done) return done;
+    tell();
   }
   return write_tables();
 }

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "emit/physics/constants.hpp"
+#include "emit/scene/melting.hpp"
 
 namespace emit::tool {
 namespace {
@@ -106,7 +107,13 @@ void add_signs_of_words(const LoggerRecord& record, const MeasuredGround& ground
   }
   // Moist ground is computed as dry layers where the humidity of the air is not known.
   const bool holds = evaporates || scene::moisture_of(ground.material).dry();
-  if (ground.material.dry_layers_valid && holds) return;
+  if (!holds) {
+    signs.push_back(
+        {"humidity", fmt::format("material '{}' evaporates, but the record has no humidity "
+                                 "(rh_pct): it counts as dry layers",
+                                 ground.material.name)});
+  }
+  if (ground.material.dry_layers_valid) return;
   signs.push_back(
       {"material", fmt::format("material '{}' is not valid as dry layers", ground.material.name)});
 }
@@ -211,11 +218,39 @@ std::vector<GroundSign> ground_signs(const LoggerRecord& record, const MeasuredG
   add_signs_of_moisture(record, ground, heat, signs);
   const auto [coldest, warmest] = std::ranges::minmax_element(
       record.rows, {}, [](const LoggerRow& row) { return row.surface_k; });
-  if (coldest->surface_k < kFreezingK - 1.0 && warmest->surface_k > kFreezingK + 1.0) {
+  const double frozen_h =
+      hours_of(record.rows, [&](std::size_t i) { return record.rows[i].surface_k < kFreezingK; });
+  constexpr double kLongH = 0.5;
+  if (!ground.setup.moisture.dry() && frozen_h > kLongH) {
+    signs.push_back(
+        {"freezing", fmt::format("moist ground is below 0 C for {:.1f} h, down to {:.1f} K: "
+                                 "freezing takes no heat in the model, and ice sublimates as water "
+                                 "does",
+                                 frozen_h, coldest->surface_k)});
+  } else if (coldest->surface_k < kFreezingK - 1.0 && warmest->surface_k > kFreezingK + 1.0) {
     signs.push_back({"freezing",
                      fmt::format("the surface goes from {:.1f} to {:.1f} K: water in the ground "
                                  "freezes and thaws, which the model lacks",
                                  coldest->surface_k, warmest->surface_k),
+                     false});
+  }
+  const double thawed_h =
+      hours_of(record.rows, [&](std::size_t i) { return record.rows[i].surface_k > kFreezingK; });
+  if (scene::is_snow_or_ice(ground.material) && thawed_h > kLongH) {
+    signs.push_back(
+        {"melting", fmt::format("'{}' is above 0 C for {:.1f} h, up to {:.1f} K: melting takes no "
+                                "heat in the model",
+                                ground.material.name, thawed_h, warmest->surface_k)});
+  }
+  constexpr double kMostWindMS = 20.0;
+  const double stormy_h = hours_of(record.rows, [&](std::size_t i) {
+    return record.rows[i].wind_m_s > kMostWindMS && record.rows[i].film_w_m2_k <= 0.0;
+  });
+  if (stormy_h > 0.0) {
+    signs.push_back({"wind",
+                     fmt::format("wind above 20 m/s for {:.1f} h, beyond the measurements of the "
+                                 "air film",
+                                 stormy_h),
                      false});
   }
   const double record_h = (record.rows.back().time_s - record.rows.front().time_s) / 3600.0;

@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
+#include <string>
 
 #include "emit/physics/constants.hpp"
 #include "emit/reference/solve.hpp"
@@ -232,6 +234,50 @@ TEST(ReferenceKeys, ProbeOfNothingIsNotANumber) {
   EXPECT_NEAR((*points)[1].position_m.z, 0.6, 1e-6);
   EXPECT_NEAR((*points)[1].temperature_k, 290.0, 1e-6);
   EXPECT_TRUE(std::isnan((*points)[2].temperature_k));
+}
+
+TEST(ReferenceKeys, NotesNameTheLimitsThatWeatherAndTemperaturesPass) {
+  const auto notes_of = [](double air_k, double rain_mm_h, double wind_m_s, bool humidity,
+                           const char* family) {
+    TestScene t = wall_scene();
+    scene::Material& ground = t.geometry.materials[0];
+    if (*family == '\0') ground.water_store_mm = 0.5;
+    ground.family = family;
+    ground.base_k = t.geometry.materials[1].base_k = t.scenario.thermal.initial_k = air_k;
+    t.scenario.materials = t.geometry.materials;
+    for (const std::int64_t hour : {-400, 0, 1, 10}) {
+      scene::WeatherSample row;
+      row.sim_time_ns = hour * kEndNs;
+      row.longwave_down_w_m2 = physics::kStefanBoltzmannWPerM2K4 * std::pow(air_k, 4.0);
+      row.air_k = air_k;
+      row.wind_m_s = wind_m_s;
+      if (humidity) row.relative_humidity_frac = 0.9;
+      row.rain_mm_h = hour == 1 ? rain_mm_h : 0.0;
+      t.scenario.weather.push_back(row);
+    }
+    SolveOptions options = quick_options();
+    options.dimension = SolveDimension::one;
+    options.spin_up_s = 7200.0;
+    auto solver = SceneSolver::create(t.scenario, t.geometry, options, kEndNs);
+    EXPECT_TRUE(solver.has_value()) << (solver ? "" : solver.error().text);
+    if (!solver) return std::string();
+    // Twice the same says it once.
+    for (int i = 0; i < 2; ++i) {
+      EXPECT_TRUE(solver->probe(std::span(&kFoot, 1), kEndNs).has_value());
+    }
+    std::string names;
+    for (const std::string& note : solver->report().notes) {
+      names += note.substr(0, note.find(':')) + " ";
+    }
+    return names;
+  };
+  EXPECT_EQ(notes_of(285.0, 0.0, 3.0, true, ""), "");
+  EXPECT_EQ(notes_of(285.0, 0.0, 3.0, false, ""), "");
+  EXPECT_EQ(notes_of(285.0, 2.0, 3.0, true, ""), "rain_unknown ");  // the top of the wall
+  EXPECT_EQ(notes_of(265.0, 2.0, 25.0, false, ""),
+            "snowfall strong_wind humidity_unknown rain_unknown freezing ");
+  EXPECT_EQ(notes_of(265.0, 0.0, 3.0, true, "water, snow and ice"), "");
+  EXPECT_EQ(notes_of(280.0, 0.0, 3.0, true, "water, snow and ice"), "melting ");
 }
 
 }  // namespace

@@ -173,14 +173,15 @@ TEST(RendererCachedWeather, FramesSayThatNobodyKnowsWhatRainDoes) {
     request.sim_time_ns = request.thermal_time_ns = at_ns;
     request.sensor_pose = pose;
     const auto slot = static_cast<renderer::SlotIndex>((*made)->submit(request));
-    return (*made)->collect(slot).stats.unknown_wet;
+    return renderer::has((*made)->collect(slot).stats.heat_limits,
+                         renderer::HeatLimit::rain_unknown);
   };
-  EXPECT_EQ(unknown(2 * kHourNs), 0U);
+  EXPECT_FALSE(unknown(2 * kHourNs));
   scene::WeatherSample told = weather_at(scenario, 2 * kHourNs + kSecondNs, 1.0);
   told.rain_mm_h = 60.0;
   ASSERT_TRUE((*made)->apply_weather(told));
-  EXPECT_EQ(unknown(2 * kHourNs + 2 * kSecondNs), 0U) << "drops";
-  EXPECT_EQ(unknown(2 * kHourNs + 10 * kSecondNs), 1U);
+  EXPECT_FALSE(unknown(2 * kHourNs + 2 * kSecondNs)) << "drops";
+  EXPECT_TRUE(unknown(2 * kHourNs + 10 * kSecondNs));
 }
 
 TEST(RendererCachedWeather, FramesSayWhileSomeSurfacesDoNotKnowYet) {

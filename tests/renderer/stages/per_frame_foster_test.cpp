@@ -165,6 +165,33 @@ TEST(RendererFoster, RainedOnGroundFollowsTheModelInDouble) {
   }
 }
 
+TEST(RendererFoster, SaysThatEntitiesHaveTheFilmOfSceneryAndThatThereAreNoRoofs) {
+  const auto warnings_of = [](const scene::ScenarioDesc& scenario) {
+    auto made = renderer::Renderer::create(scenario, {}, {});
+    EXPECT_TRUE(made.has_value()) << (made ? "" : made.error().text);
+    std::string all;
+    if (!made) return all;
+    for (const std::string& warning : (*made)->scene_stats().warnings) all += warning + "\n";
+    return all;
+  };
+  const auto says = [](const std::string& text, const char* part) {
+    return text.find(part) != std::string::npos;
+  };
+  auto scenario = foster_scenario(write_quads("plane", {ground(50.0, 50.0)}));
+  scenario.materials[0].water_store_mm = 0.48;
+  EXPECT_FALSE(says(warnings_of(scenario), "per-frame"));
+  scenario.weather = {weather(300.0, 100.0, 340.0, 290.0)};
+  scenario.weather[0].rain_mm_h = 1.0;
+  EXPECT_TRUE(says(warnings_of(scenario), "knows no roofs: rain wets all that looks up"));
+  park_vehicle(scenario, kHourNs);
+  EXPECT_TRUE(says(warnings_of(scenario),
+                   "gives 'vehicle' the film of scenery in the wind, without "
+                   "its own speed, recovery temperature and 'air_film'"));
+  scenario.thermal.method = scene::ThermalMethod::cached;
+  const std::string cached = warnings_of(scenario);
+  EXPECT_FALSE(says(cached, "film of scenery") || says(cached, "roofs")) << cached;
+}
+
 TEST(RendererFoster, TiltedFacesFollowTheModelInDouble) {
   // Look at a plate from its front. It is open, so its obscurance is that of flat ground. No plate
   // turns to or from the sun within an interval, where the clamped cosine of the shader would be

@@ -328,7 +328,8 @@ TEST(CliRender, dry_surfaces_after_rain_are_put_down_to_what_they_are_due_to) {
   const std::string extended = warnings("foster");
   EXPECT_EQ(count(extended, "emit2014"), 0U) << extended;
   EXPECT_EQ(count(extended, "'painted_metal' states no 'water_store_mm'"), 1U) << extended;
-  EXPECT_EQ(count(extended, "because they state no store of water"), 1U) << extended;
+  EXPECT_EQ(count(extended, "rain_unknown: it rained on materials that state no store"), 1U)
+      << extended;
 }
 
 TEST(CliRender, an_unknown_band_exits_with_2_and_lists_the_bands) {

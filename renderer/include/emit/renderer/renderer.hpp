@@ -12,6 +12,7 @@
 
 #include "emit/physics/error.hpp"
 #include "emit/physics/frames.hpp"
+#include "emit/renderer/heat_limits.hpp"
 #include "emit/scene/scene_desc.hpp"
 
 /// Interface of the renderer to the rest of emitd. One thread owns a Renderer from create() to its
@@ -129,9 +130,9 @@ struct FrameStats {
   /// Small targets without a window of their own, because a frame has no more windows or its draws
   /// fill their memory. They have one sample per pixel, so their energy is not kept.
   std::uint32_t plain_targets = 0;
-  /// Materials of the scene that look up and do not state what rain does to them, in a frame at
-  /// most six hours after rain. Their surfaces are shown dry.
-  std::uint32_t unknown_wet = 0;
+  /// Limits of the formulae that were passed in the last six hours of thermal time. They hold for
+  /// the scene, whether or not the picture shows the surfaces that they touch.
+  HeatLimits heat_limits;
   /// Wall time that this frame spent on preparing the surface anew because the thermal time had
   /// jumped, s. It is 0 in other frames. Such a frame is also `coarse`.
   double rewarm_s = 0.0;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <glm/ext/vector_double3.hpp>
 #include <span>
@@ -29,9 +31,24 @@ struct SurfaceForcing {
   physics::AirFilm film;          ///< film of scenery in that flow
   double air_k = 0.0;             ///< air temperature
   physics::MoistAir moist;        ///< moisture of the air
-  /// Share of open, level ground that rain has wetted, by slot (FosterMaterial::water_slot).
+  // Share of open, level ground that rain has wetted, by slot (FosterMaterial::water_slot): of
+  // ground that gets all of the rain, half of it, and none of it.
   std::array<double, physics::kWaterSlots> wet_frac{};
+  std::array<double, physics::kWaterSlots> half_wet_frac{};
+  std::array<double, physics::kWaterSlots> sheltered_wet_frac{};
+
+  /// Returns the wetness of a face that gets a share of the rain, 0..1: linear between the three.
+  [[nodiscard]] double wet_frac_at(std::size_t slot, double rain_frac) const noexcept {
+    const double halves = 2.0 * std::clamp(rain_frac, 0.0, 1.0);
+    return halves < 1.0 ? std::lerp(sheltered_wet_frac[slot], half_wet_frac[slot], halves)
+                        : std::lerp(half_wet_frac[slot], wet_frac[slot], halves - 1.0);
+  }
 };
+/// Returns the share of the rain on level ground that falls on a face without anything above it, by
+/// the vertical part of its normal. Rain falls straight down.
+[[nodiscard]] constexpr double rain_by_tilt_frac(double up) noexcept {
+  return up > 0.0 ? up : 0.0;
+}
 /// Forcing over an interval. It goes linearly from begin to end.
 struct IntervalForcing {
   SurfaceForcing begin;
@@ -63,6 +80,7 @@ struct FosterMaterial {
   physics::WaterStore store;       ///< room for rain water
   int water_slot = -1;             ///< of SurfaceForcing::wet_frac; -1: it holds no water
   bool water_shared = false;       ///< too few slots: the ground of its slot is that of another one
+  bool snow_or_ice = false;        ///< it cannot be above 0 C (scene/melting.hpp)
   bool sheet = false;              ///< driven by the mean of the fluxes that its two faces receive
   bool body = false;               ///< the base is the interior of a body, which starts at base_k
   /// Layers in which heat moves sideways; empty for sheets and for prescribed temperatures.
@@ -75,14 +93,13 @@ struct FosterMaterial {
   [[nodiscard]] bool prescribed() const noexcept { return network.count == 0; }
 };
 
-/// Returns the exchange of water of a face whose normal has that vertical part.
+/// Returns the exchange of water of a face that gets a share of the rain on open, level ground.
 [[nodiscard]] inline physics::MoistSurface moisture_at(const FosterMaterial& material,
                                                        const SurfaceForcing& forcing,
-                                                       double up) noexcept {
+                                                       double rain_frac) noexcept {
   physics::MoistSurface out = material.moisture;
   if (material.water_slot >= 0) {
-    out.film_frac =
-        physics::face_wet_frac(forcing.wet_frac[static_cast<std::size_t>(material.water_slot)], up);
+    out.film_frac = forcing.wet_frac_at(static_cast<std::size_t>(material.water_slot), rain_frac);
   }
   return out;
 }

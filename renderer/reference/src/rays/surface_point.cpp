@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <memory>
 
 #include "emit/physics/check.hpp"
 #include "emit/reference/surface_forcing.hpp"
@@ -73,9 +74,9 @@ PointSolver::PointSolver(const SurfaceClimate& climate, const LayerMesh& mesh,
   start_profile_ = steady_profile(solid_layers(material.layers), initial_k_,
                                   material.sheet ? initial_k_ : material.base_k);
   if (material.prescribed_k) return;
-  wet_frac_ = water_course(climate.nodes(), material, initial_k_,
-                           climate.surroundings_reflectance_frac(), mesh, steps)
-                  .wet_frac;
+  auto rain = std::make_shared<const RainCourses>(
+      climate.nodes(), material, initial_k_, climate.surroundings_reflectance_frac(), mesh, steps);
+  if (!rain->empty()) rain_ = std::move(rain);
 }
 
 double PointSolver::seconds(std::int64_t time_ns) const noexcept {
@@ -87,6 +88,13 @@ void PointSolver::advance(const SurfaceOptics& surface, const Views& views,
   const auto nodes = climate_->nodes();
   SurfaceOptics behind = surface;
   behind.normal = -surface.normal;
+  // Rain that falls straight down meets a tilted face by its cosine.
+  const double front_rain = views.front_rain_frac.value_or(std::max(0.0, surface.normal.z));
+  const double back_rain = views.back_rain_frac.value_or(std::max(0.0, -surface.normal.z));
+  const auto wetness_at = [&](std::size_t node) {
+    const double front = rain_->at_node(node, front_rain);
+    return material_->sheet ? 0.5 * (front + rain_->at_node(node, back_rain)) : front;
+  };
   // Step to the next time at which climate or view bends.
   while (now_ns_ < until_ns) {
     seek(nodes, now_ns_, climate_row_);
@@ -101,13 +109,13 @@ void PointSolver::advance(const SurfaceOptics& surface, const Views& views,
     // Build the state of the face. A sheet takes the mean of both faces, physics.md eq. 24.
     const auto state = [&](std::int64_t time_ns) {
       ClimateNode climate = value_at(nodes, time_ns, climate_row_);
-      if (!wet_frac_.empty()) {
+      if (rain_ != nullptr) {
         // Interpolate as the climate is.
         ClimateNode a = nodes[climate_row_];
-        a.wet_frac = wet_frac_[climate_row_];
+        a.wet_frac = wetness_at(climate_row_);
         const std::size_t next = std::min(climate_row_ + 1, nodes.size() - 1);
         ClimateNode b = nodes[next];
-        b.wet_frac = wet_frac_[next];
+        b.wet_frac = wetness_at(next);
         climate.wet_frac = value_at(std::array{a, b}, time_ns, 0).wet_frac;
       }
       const double reflectance_frac = climate_->surroundings_reflectance_frac();
@@ -159,7 +167,7 @@ void PointSolver::run(const glm::dvec3& normal, const Views& views,
                               scene::roughness_factor(material_->roughness),
                               material_->sheet,
                               scene::moisture_of(*material_),
-                              !wet_frac_.empty()};
+                              rain_ != nullptr};
   // Repeat the spin-up only for another orientation.
   if (!has_spin_up_ || normal != spin_up_normal_) spin_up(surface);
   const std::int64_t start_ns = climate_->history_start_ns();
@@ -172,7 +180,8 @@ void PointSolver::run(const glm::dvec3& normal, const Views& views,
   const ViewSample open = open_view(normal);
   const ViewSample open_behind = open_view(-normal);
   const Views seen{views.front.empty() ? std::span(&open, 1) : views.front,
-                   views.back.empty() ? std::span(&open_behind, 1) : views.back};
+                   views.back.empty() ? std::span(&open_behind, 1) : views.back,
+                   views.front_rain_frac, views.back_rain_frac};
   // Advance from answer to answer.
   for (std::size_t i = 0; i < times_ns.size(); ++i) {
     advance(surface, seen, times_ns[i]);

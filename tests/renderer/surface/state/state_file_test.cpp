@@ -66,6 +66,7 @@ struct World {
       sample.sky_frac = number();
       sample.sphere_sky_frac = number();
       sample.far_frac = number();
+      sample.rain_frac = number();
       sample.hull_open_frac = number();
       sample.hull_tilt_frac = {number(), number(), number()};
       sample.first_seen = i;
@@ -195,6 +196,7 @@ TEST_F(StateFile, gives_back_what_was_written_and_leaves_nothing_beside_it) {
     EXPECT_EQ(a.sky_frac, b.sky_frac);
     EXPECT_EQ(a.sphere_sky_frac, b.sphere_sky_frac);
     EXPECT_EQ(a.far_frac, b.far_frac);
+    EXPECT_EQ(a.rain_frac, b.rain_frac);
     EXPECT_EQ(a.hull_open_frac, b.hull_open_frac);
     EXPECT_EQ(a.hull_tilt_frac, b.hull_tilt_frac);
     EXPECT_EQ(a.first_seen, b.first_seen);

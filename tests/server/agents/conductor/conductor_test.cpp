@@ -79,6 +79,41 @@ TEST(RenderAgent, FramesOfASurfaceThatIsTooCoarseAreDegradedAndCounted) {
   EXPECT_EQ(rig.count(Counter::frames_coarse), 1U);
 }
 
+TEST(RenderAgent, EachLimitOfTheHeatIsCountedByItsNameAndToldOnceInARun) {
+  const Counter counters[] = {Counter::frames_wet_unknown, Counter::frames_rain_shelter,
+                              Counter::frames_snowfall,    Counter::frames_freezing,
+                              Counter::frames_melting,     Counter::frames_humidity_unknown,
+                              Counter::frames_strong_wind};
+  ASSERT_EQ(std::size(counters), renderer::kHeatLimits);
+  for (std::size_t i = 0; i < renderer::kHeatLimits; ++i) {
+    SCOPED_TRACE(i);
+    Rig rig;
+    rig.send(1, 1);
+    rig.settle();
+    rig.script.heat_limits.set(i);
+    rig.send(2, 2);
+    rig.settle();
+    rig.send(3, 3);
+    rig.settle();
+    ASSERT_EQ(rig.frames.size(), 3U);
+    for (std::size_t f = 0; f < 3; ++f) {
+      EXPECT_EQ((rig.frames[f].header.flags & protocol::kFlagDegraded) != 0U, f > 0);
+      EXPECT_EQ(std::isnan(rig.frames[f].header.estimated_error_k), f > 0);
+    }
+    for (std::size_t other = 0; other < renderer::kHeatLimits; ++other) {
+      EXPECT_EQ(rig.count(counters[other]), other == i ? 2U : 0U) << other;
+    }
+    auto& events = rig.context().render_events.ring();
+    ASSERT_NE(events.front(), nullptr);
+    EXPECT_EQ(events.front()->kind, EventKind::heat_limit);
+    const std::string sentence(renderer::text_of(static_cast<renderer::HeatLimit>(i)));
+    EXPECT_NE(describe(*events.front()).text.find("event=heat_limit why=\"" + sentence + "\""),
+              std::string::npos);
+    events.pop();
+    EXPECT_EQ(events.front(), nullptr);
+  }
+}
+
 TEST(RenderAgent, FramesWithMoreSmallTargetsThanWindowsAreDegradedAndCounted) {
   Rig rig;
   rig.script.plain_targets = 3;

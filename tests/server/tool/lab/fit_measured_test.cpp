@@ -197,6 +197,59 @@ TEST(CliBenchNature, moist_ground_evaporates_where_the_humidity_is_known) {
   EXPECT_NEAR(bias(known, "nothing_fitted_real_time"), bias(known, "nothing_fitted"), 0.3);
 }
 
+/// The day of logger_text() as a moist one, colder and windier, with a humidity in every row.
+std::string moist_text(double colder_k, double wind_m_s) {
+  std::istringstream lines(logger_text(kHeader));
+  std::string out;
+  std::string line;
+  while (std::getline(lines, line)) {
+    if (line[0] == '#' || line.starts_with("time_s")) {
+      out += line + (line[0] == '#' ? "\n" : ",rh_pct\n");
+      continue;
+    }
+    std::vector<std::string> cells;
+    std::istringstream row(line);
+    for (std::string cell; std::getline(row, cell, ',');) cells.push_back(cell);
+    cells[4] = fmt::format("{}", std::stod(cells[4]) - colder_k);
+    cells[5] = fmt::format("{}", std::stod(cells[5]) + wind_m_s);
+    cells[6] = fmt::format("{}", std::stod(cells[6]) - colder_k);
+    out += fmt::format("{},70\n", fmt::join(cells, ","));
+  }
+  return out;
+}
+
+TEST(CliBenchNature, a_moist_day_says_which_limits_it_passes) {
+  const TemporaryFolder folder;
+  const auto report = [&](const std::string& text, const std::string& material) {
+    write_text(folder.file("day.csv"), text);
+    const ProcessResult bench =
+        run_emit({"bench", "nature", folder.file("day.csv"), "--material", material},
+                 std::chrono::seconds(120));
+    EXPECT_EQ(bench.exit_code, 0) << bench.err;
+    return bench.out;
+  };
+  const std::string mild = report(moist_text(0.0, 0.0), "grass");
+  for (const char* part : {"nothing fitted", "rms K", "bias K", "max by hour, nothing fitted"}) {
+    EXPECT_THAT(mild, HasSubstr(part));
+  }
+  for (const char* part : {"DOES NOT HOLD: moist ground", "no humidity", "wind above 20"}) {
+    EXPECT_EQ(mild.find(part), std::string::npos) << mild;
+  }
+  const std::string frosty = report(moist_text(15.0, 0.0), "grass");
+  EXPECT_THAT(frosty, HasSubstr("DOES NOT HOLD: moist ground is below 0 C for "));
+  EXPECT_THAT(report(moist_text(0.0, 20.0), "grass"),
+              HasSubstr("less certain: wind above 20 m/s for "));
+  EXPECT_THAT(report(moist_text(0.0, 0.0), "snow"),
+              HasSubstr("DOES NOT HOLD: 'snow' is above 0 C"));
+  EXPECT_THAT(report(logger_text(kHeader), "grass"),
+              HasSubstr("DOES NOT HOLD: material 'grass' evaporates, but the record has no "
+                        "humidity (rh_pct): it counts as dry layers"));
+  // The fit says the same.
+  write_text(folder.file("day.csv"), moist_text(15.0, 0.0));
+  EXPECT_THAT(run_emit({"fit", "--measured", folder.file("day.csv"), "--material", "grass"}).out,
+              HasSubstr("DOES NOT HOLD: moist ground is below 0 C for "));
+}
+
 TEST(CliBenchNature, names_what_it_cannot_read) {
   const TemporaryFolder folder;
   EXPECT_EQ(run_emit({"bench", "nature"}).exit_code, 2);

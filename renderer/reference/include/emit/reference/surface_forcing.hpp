@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/ext/vector_double3.hpp>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -38,7 +39,7 @@ struct ClimateNode {
   double surroundings_k = 0.0;
   double vapour_pa = 0.0;  ///< of the air
   double rain_mm = 0.0;    ///< depth since some instant
-  double wet_frac = 0.0;   ///< share of level ground that rain has wetted; that of a material
+  double wet_frac = 0.0;   ///< share of a face that rain has wetted, mean over both of a sheet
 };
 
 /// Options of SurfaceClimate::create().
@@ -120,6 +121,8 @@ struct SurfaceOptics {
 [[nodiscard]] physics::Result<LayerMesh> material_mesh(const scene::Material& material,
                                                        const MeshOptions& options = {});
 
+class RainCourses;
+
 /// Solver of the surface temperature of points of one material. At the climate's start the profile
 /// is the steady one between the initial temperature and the base. Until the history starts the
 /// point is unshadowed; from then on its view follows its samples.
@@ -135,6 +138,9 @@ class PointSolver {
   struct Views {
     std::span<const ViewSample> front;
     std::span<const ViewSample> back;
+    // Share of the rain on open, level ground that each face gets; absent: nothing is above it.
+    std::optional<double> front_rain_frac = std::nullopt;
+    std::optional<double> back_rain_frac = std::nullopt;
   };
   /// Computes the temperatures at `times_ns`, which ascend. A time before the start of the history
   /// gives the temperature of its start. A prescribed material gives its prescribed temperature.
@@ -161,7 +167,7 @@ class PointSolver {
   bool has_spin_up_ = false;
   glm::dvec3 spin_up_normal_{0.0};
   std::vector<double> spin_up_k_;  ///< temperature of every node at the start of the history
-  std::vector<double> wet_frac_;   ///< of level ground at the nodes of the climate; empty: dry
+  std::shared_ptr<const RainCourses> rain_;  ///< null: it never holds water
   std::vector<ProfilePoint> start_profile_;
 };
 
