@@ -275,9 +275,11 @@ function drawTemperatures(
   context: CanvasRenderingContext2D, rows: Row[], x: (time: number) => number, left: number, right: number,
   height: number, result: Result,
 ): void {
-  const top = 27;
+  const top = 42;
   const bottom = height - 16;
-  const values = rows.flatMap((row) => [row.temperature_k, row.equilibrium_k]).filter((one) => one !== null) as number[];
+  const values = rows
+    .flatMap((row) => [row.temperature_k, row.equilibrium_k])
+    .filter((one) => one !== null) as number[];
   if (values.length === 0) return;
   const lowest = Math.min(...values);
   const highest = Math.max(...values);
@@ -321,13 +323,16 @@ function drawTemperatures(
   draw((row) => row.temperature_k, SURFACE, 2);
   const last = rows[rows.length - 1];
   context.textAlign = "left";
-  const legend = (text: string, kelvin: number | null, color: string, at: number) => {
+  let at = left;
+  const legend = (text: string, kelvin: number | null, color: string) => {
     if (kelvin === null) return;
+    const words = `${text} ${kelvin.toFixed(2)} K`;
     context.fillStyle = color;
-    context.fillText(`${text} ${kelvin.toFixed(2)} K`, left + 6, top + 12 + 14 * at);
+    context.fillText(words, at, top - 6);
+    at += context.measureText(words).width + 16;
   };
-  legend("surface", last.temperature_k, SURFACE, 0);
-  legend("without memory", last.equilibrium_k, EQUILIBRIUM, 1);
+  legend("surface", last.temperature_k, SURFACE);
+  legend("without memory", last.equilibrium_k, EQUILIBRIUM);
 }
 
 /** Draws lines at full hours of UTC. */
@@ -337,9 +342,12 @@ function drawHours(
   result: Result,
 ): void {
   const now = Date.parse(result.utc) / 1000;
-  const hours = (rows[rows.length - 1].sim_time_s - rows[0].sim_time_s) / 3600;
-  const step = hours > 12 ? 3 : hours > 5 ? 2 : 1;
+  const hourPx = x(rows[0].sim_time_s + 3600) - x(rows[0].sim_time_s);
+  const step = [1, 2, 3, 6, 12].find((hours) => hours * hourPx > 34) ?? 24;
   const first = Math.ceil((now - (result.sim_time_s - rows[0].sim_time_s)) / 3600);
+  context.textAlign = "right";
+  context.fillStyle = TEXT;
+  context.fillText("UTC", x(rows[0].sim_time_s) - 6, height - 3);
   context.textAlign = "center";
   for (let hour = first; 3600 * hour <= now; ++hour) {
     if (hour % step !== 0) continue;
@@ -347,6 +355,6 @@ function drawHours(
     context.strokeStyle = GRID;
     line(at, top, at, bottom);
     context.fillStyle = TEXT;
-    context.fillText(`${String(hour % 24).padStart(2, "0")} UTC`, at, height - 3);
+    context.fillText(`${String(hour % 24).padStart(2, "0")}h`, at, height - 3);
   }
 }

@@ -253,7 +253,8 @@ export class ReplayBar {
     context.textAlign = "center";
     for (const mark of ticks(0, recording.length_s, Math.max(2, Math.floor(width / 110)))) {
       context.fillRect(this.placeOf(mark), bottom, 1, 3);
-      context.fillText(`${Number(mark.toPrecision(6))} s`, Math.min(Math.max(this.placeOf(mark), 18), width - 22), height - 2);
+      const at = Math.min(Math.max(this.placeOf(mark), 18), width - 22);
+      context.fillText(`${Number(mark.toPrecision(6))} s`, at, height - 2);
     }
     for (const [kind, position] of recording.marks) {
       const tall = kind === "run" ? bottom - top : kind === "late" ? 5 : 9;
@@ -277,7 +278,9 @@ export class ReplayBar {
     const mark = this.markNear(position);
     const place = mark?.[1] ?? position;
     needle(place, this.dragging ? TARGET : "rgba(200, 214, 229, 0.6)", this.dragging ? 3 : 1);
-    const text = `${place.toFixed(3)} s \u00b7 simulation ${this.simTimeAt(place).toFixed(3)} s${mark === null ? "" : ` \u00b7 ${mark[2]}`}`;
+    const words = [`${place.toFixed(3)} s`, `simulation ${this.simTimeAt(place).toFixed(3)} s`];
+    if (mark !== null) words.push(mark[2]);
+    const text = words.join(" \u00b7 ");
     const half = context.measureText(text).width / 2 + 4;
     context.fillStyle = RUN;
     context.fillText(text, Math.min(Math.max(this.placeOf(place), half), width - half), 11);
