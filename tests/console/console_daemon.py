@@ -40,17 +40,22 @@ def replay_console(journal, scenario, overrides, *more):
     process = subprocess.Popen(
         [BIN_DIR / "emit", "replay", journal, "--scenario", scenario, *overrides, "--console", "127.0.0.1:0", *more],
         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    reader = None
     try:
         for line in process.stderr:
             if "console=http://" in line:
                 # What follows is read on, so that the pipe does not fill up.
-                threading.Thread(target=process.stderr.read, daemon=True).start()
+                reader = threading.Thread(target=process.stderr.read)
+                reader.start()
                 yield line.split("console=http://")[1].strip().rstrip("/")
                 return
         raise AssertionError("emit replay has no console")
     finally:
         process.send_signal(signal.SIGINT)
         process.wait(60)
+        if reader is not None:
+            reader.join()
+        process.stderr.close()
 
 
 def start(pacing, address="127.0.0.1:0", more=""):

@@ -59,7 +59,7 @@ class Replay(unittest.TestCase):
         self.page.wait_for(f"!{STATE}.playing && {STATE}.target_s === null", PATIENCE_S)
 
     def wait_for_frame(self, number):
-        self.page.wait_for(f"{SHOWN} === {number} && {STATE}.target_s === null && "
+        self.page.wait_for(f"{SHOWN} === {number} && {STATE}.target_s === null && {STATE}.frame === {number - 1} && "
                            f"emitConsole.image.frame.frame_number === {number}", PATIENCE_S)
 
     def assert_is_recorded(self):
