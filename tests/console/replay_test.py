@@ -107,10 +107,14 @@ class Replay(unittest.TestCase):
             self.assert_is_recorded()
             # Drag: nothing happens before the pointer is let go.
             x, y = self.place_of(10)
-            self.page.call("Input.dispatchMouseEvent", type="mousePressed", x=x - 60, y=y, button="left", clickCount=1)
-            self.page.move(x, y)
+
+            def mouse(kind, at, **more):
+                self.page.call("Input.dispatchMouseEvent", type=kind, x=at, y=y, button="left", **more)
+
+            mouse("mousePressed", x - 60, buttons=1, clickCount=1)
+            mouse("mouseMoved", x, buttons=1)
             self.assertEqual(self.page.evaluate(SHOWN), 2)
-            self.page.call("Input.dispatchMouseEvent", type="mouseReleased", x=x, y=y, button="left", clickCount=1)
+            mouse("mouseReleased", x, clickCount=1)
             self.page.wait_for(f"{SHOWN} >= 10 && {SHOWN} <= 12 && {STATE}.frame === {SHOWN} - 1", PATIENCE_S)
             self.assert_is_recorded()
             self.keep("replay")
