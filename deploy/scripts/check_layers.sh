@@ -77,6 +77,7 @@ server/tool/support: server/app server/pacing server/telemetry config/include pr
 server/tool/command_line: server/tool/support config/include renderer/physics
 server/tool/logger: server/tool/command_line server/tool/support config/include renderer/physics renderer/reference renderer/scene
 server/tool/streams: server/tool/command_line server/tool/support server/app server/client server/rt protocol renderer/image renderer/physics renderer/scene
+server/tool/replay: server/tool/command_line server/tool/streams server/tool/support server/agents server/app server/console server/net server/telemetry protocol renderer/physics
 server/tool/foxglove: server/tool/command_line server/tool/streams server/tool/support protocol renderer/image renderer/physics
 server/tool/view: server/tool/support server/tool/streams server/client renderer/image renderer/include renderer/physics
 server/tool/report: server/tool/support renderer/physics
@@ -90,10 +91,10 @@ server/tool/fms_sim: server/axes server/motion server/net server/tool/support co
 server/tool/truth: server/tool/support renderer/physics renderer/reference renderer/scene
 server/tool/doctor: server/tool/command_line server/tool/support config/include renderer/include
 server/tool/nature: server/tool/command_line server/tool/support config/include renderer/physics renderer/scene
-server/tool/offline: server/tool/command_line server/tool/report server/tool/support server/tool/truth renderer/include renderer/physics renderer/reference renderer/scene
+server/tool/offline: server/agents server/app server/tool/command_line server/tool/report server/tool/support server/tool/truth protocol renderer/include renderer/physics renderer/reference renderer/scene
 server/tool/campaign: server/app server/client server/tool/command_line server/tool/offline server/tool/report server/tool/streams server/tool/support config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
 server/tool/scenes: server/tool/command_line server/tool/offline server/tool/support config/include renderer/image renderer/include renderer/physics renderer/reference renderer/scene renderer/scene/generate
-server/tool/commands: server/tool/doctor server/tool/foxglove server/tool/scenes server/tool/nature server/tool/campaign server/tool/command_line server/tool/offline server/tool/engage server/tool/truth server/tool/support server/tool/streams server/tool/view server/tool/fms_sim server/gnss server/motion server/agents server/agents/render server/app server/client server/net server/rt config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
+server/tool/commands: server/tool/doctor server/tool/foxglove server/tool/scenes server/tool/nature server/tool/campaign server/tool/command_line server/tool/offline server/tool/engage server/tool/truth server/tool/support server/tool/replay server/tool/streams server/tool/view server/tool/fms_sim server/gnss server/motion server/agents server/agents/render server/app server/client server/net server/rt config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
 server/tool/lab: server/tool/command_line server/tool/support server/tool/commands server/tool/logger server/bench/accuracy server/bench/frame_time server/bench/nature server/bench/stability server/bench/stream config/include renderer/image renderer/physics renderer/reference renderer/scene renderer/verify
 server/tool: server/tool/commands server/tool/lab server/tool/support
 '

@@ -53,7 +53,8 @@ bool lists_devices(const char* client) {
 }
 
 /// Returns the EGL devices, hardware before software, then the surfaceless platform. With gpu_index
-/// >= 0 it returns that device alone. `tried` gets the reason when the list is empty.
+/// >= 0 it returns that device alone, with kSoftwareIndex the software devices. `tried` gets the
+/// reason when the list is empty.
 std::vector<Candidate> list_candidates(int gpu_index, std::string& tried) {
   std::vector<Candidate> candidates;
   const char* client = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
@@ -84,6 +85,10 @@ std::vector<Candidate> list_candidates(int gpu_index, std::string& tried) {
       return {};
     }
     return {candidates[static_cast<std::size_t>(gpu_index)]};
+  }
+  if (gpu_index == EglContext::kSoftwareIndex) {
+    if (software.empty()) tried = "EGL lists no software device";
+    return software;
   }
   if (has_extension(client, "EGL_MESA_platform_surfaceless")) {
     candidates.push_back({eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, nullptr, nullptr),

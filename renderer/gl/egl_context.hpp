@@ -13,10 +13,13 @@ namespace emit::gl {
 /// Thread: one, for life.  Real time: setup only.
 class EglContext {
  public:
+  /// Index of whatever software device there is.
+  static constexpr int kSoftwareIndex = -2;
+
   /// Creates a context.
   /// @param gpu_index  0 or more: the EGL device of that index (hardware devices are counted first,
   ///   then software ones); -1: the first hardware device that gives a 4.5 context, otherwise
-  ///   Mesa's surfaceless platform
+  ///   Mesa's surfaceless platform; kSoftwareIndex: a software device
   /// @param debug      true: a debug context
   /// Errors (gpu): no device, or no 4.5 context; the text names every platform and device that was
   /// tried.

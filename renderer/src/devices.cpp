@@ -5,6 +5,8 @@
 
 namespace emit::renderer {
 
+static_assert(kSoftwareDevice == gl::EglContext::kSoftwareIndex);
+
 std::vector<GraphicsDevice> graphics_devices() {
   std::vector<GraphicsDevice> out;
   const int count = gl::EglContext::device_count();

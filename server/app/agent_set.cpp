@@ -91,6 +91,10 @@ physics::Result<Recorder::Opened> AgentSet::make_recorder(const ProcessNames& na
   recording.SerializeToString(&identity.recording);
   recorder_ = std::make_unique<Recorder>(context_, config_.journal, config_.control.max_clients);
   recorder_->set_identity(std::move(identity));
+  if (!config_.console.listen.empty()) {
+    journal_tap_ = std::make_unique<JournalTap>(context_.bells.recorder);
+    recorder_->set_tap(journal_tap_.get());
+  }
   auto opened = recorder_->open();
   if (!opened) {
     return tl::unexpected<Error>(std::move(opened.error()).with_context("journal.file"));

@@ -100,6 +100,8 @@ class AgentSet {
   [[nodiscard]] Conductor& conductor() const;
   /// Returns where the console takes its images from; null: there is no console.
   [[nodiscard]] ConsoleTap* console_tap() const noexcept { return console_tap_.get(); }
+  /// Returns where the console gets the journal of the run from; null: there is no console.
+  [[nodiscard]] JournalTap* journal_tap() const noexcept { return journal_tap_.get(); }
   /// Returns the gateway agent; null: there is none.
   [[nodiscard]] const GatewayAgent* gateway() const noexcept { return gateway_.get(); }
 
@@ -143,6 +145,7 @@ class AgentSet {
   // Runners are destroyed before the agents that they run.
   std::unique_ptr<Receiver> receiver_;
   std::unique_ptr<RenderAgent> render_;
+  std::unique_ptr<JournalTap> journal_tap_;
   std::unique_ptr<Recorder> recorder_;
   std::unique_ptr<ShmClient> shm_;
   std::unique_ptr<ConsoleTap> console_tap_;

@@ -38,6 +38,11 @@ physics::Result<std::unique_ptr<ConsoleEndpoint>> ConsoleEndpoint::open(
     return named(address.error());
   }
   std::unique_ptr<ConsoleEndpoint> endpoint(new ConsoleEndpoint(config, parts, std::move(facts)));
+  if (endpoint->facts_.no_explanation.empty()) {
+    endpoint->explainer_ =
+        std::make_unique<Explainer>(parts.explain_command, parts.journal,
+                                    [&context = parts.context] { context.bells.console.ring(); });
+  }
   auto server = ConsoleServer::start(*address, parts.context, parts.tap, endpoint->answers(),
                                      {config.console.rate_hz, own_names(config.console.listen)});
   if (!server) {
@@ -60,6 +65,10 @@ ConsoleServer::Answers ConsoleEndpoint::answers() {
   answers.status = [this](std::size_t pages) { return status(pages); };
   answers.temperatures = [this](std::size_t channel) {
     return console_temperatures(parts_.context.channels[channel]);
+  };
+  answers.explain = [this](const ExplainRequest& request) { return explain(request); };
+  answers.explained = [this]() -> std::optional<Explained> {
+    return explainer_ ? explainer_->take() : std::nullopt;
   };
   answers.command = [this](CommandKind command, bool local, std::uint32_t page) {
     return take_command(command, local, page);
@@ -117,6 +126,25 @@ std::string ConsoleEndpoint::take_command(CommandKind command, bool local, std::
   parts_.context.console_inputs.commit();
   parts_.context.bells.conductor.ring();
   return {};
+}
+
+std::string ConsoleEndpoint::explain(ExplainRequest request) {
+  if (!explainer_) return facts_.no_explanation;
+  const Channel& channel = parts_.context.channels[request.channel];
+  const Camera& camera = parts_.context.cameras[channel.camera];
+  if (channel.quantity != protocol::PixelQuantity::radiance_w_m2_sr || channel.output_steps != 0) {
+    return "the channel's pixels are no longer those of the sensor: choose one without output "
+           "steps";
+  }
+  if (channel.camera != 0 || camera.along_projector || camera.mount != scene::ChannelCamera{}) {
+    return "the channel has a camera of its own: only the sensor's own view can be explained";
+  }
+  if (request.x_px >= channel.width_px || request.y_px >= channel.height_px) {
+    return "the pixel lies outside the image";
+  }
+  request.sensor_x_px = channel.window_px.x_px + request.x_px;
+  request.sensor_y_px = channel.window_px.y_px + request.y_px;
+  return explainer_->ask(request) ? std::string() : "explanations before it still wait";
 }
 
 }  // namespace emit::server

@@ -2,6 +2,7 @@
 #pragma once
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "agents/context.hpp"
 #include "agents/receiver/receiver.hpp"
@@ -9,6 +10,7 @@
 #include "console/console_server.hpp"
 #include "console/console_state.hpp"
 #include "console/console_tap.hpp"
+#include "console/explainer.hpp"
 #include "emit/config/daemon_config.hpp"
 #include "emit/physics/error.hpp"
 #include "telemetry/duty_cycle.hpp"
@@ -25,6 +27,8 @@ class ConsoleEndpoint {
   struct Parts {
     Context& context;
     ConsoleTap& tap;
+    JournalTap& journal;
+    const std::vector<std::string>& explain_command;  ///< DaemonOptions::explain_command
     const Liveness& liveness;
     const StatusBoard& board;
     const Receiver& receiver;            ///< it decides which peers may ask
@@ -48,10 +52,12 @@ class ConsoleEndpoint {
   [[nodiscard]] bool admits(const SocketAddress& peer) const;
   [[nodiscard]] std::string status(std::size_t pages) const;
   [[nodiscard]] std::string take_command(CommandKind command, bool local, std::uint32_t page);
+  [[nodiscard]] std::string explain(ExplainRequest request);
 
   const config::DaemonConfig& config_;
   Parts parts_;
   ConsoleFacts facts_;
+  std::unique_ptr<Explainer> explainer_;   ///< null: nothing can be explained
   std::unique_ptr<ConsoleServer> server_;  ///< its thread reads all of the above
 };
 

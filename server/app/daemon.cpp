@@ -197,14 +197,24 @@ physics::Result<void> DaemonImpl::open_console(const ProcessNames& names) {
   if (tap == nullptr) {
     return {};
   }
-  ConsoleFacts facts{names.software, names.scenario, names.pacing, names.device};
+  ConsoleFacts facts;
+  facts.software = names.software;
+  facts.scenario = names.scenario;
+  facts.pacing = names.pacing;
+  facts.device = names.device;
   const bool host_step = config_.pacing.mode == config::PacingMode::host_step;
   facts.rate_hz = host_step ? 0.0 : config_.pacing.rate_hz;
   facts.budget_ns = config_.pacing.budget_ns;
   facts.image_rate_hz = config_.console.rate_hz;
   facts.motion = config_.motion.enabled();
+  if (!scenario_ || config_.source.kind != config::SourceKind::renderer) {
+    facts.no_explanation = "only rendered scenes can be explained";
+  } else if (options_.explain_command.empty()) {
+    facts.no_explanation = "the program emit, which explains pixels, is not beside emitd";
+  }
   const ConsoleEndpoint::Parts parts{
-      context_, *tap, liveness_, log_.board(), agents_.receiver(), agents_.duty_cycles()};
+      context_,  *tap,         *agents_.journal_tap(), options_.explain_command,
+      liveness_, log_.board(), agents_.receiver(),     agents_.duty_cycles()};
   auto opened = ConsoleEndpoint::open(config_, parts, std::move(facts));
   if (!opened) {
     return tl::unexpected<Error>(std::move(opened.error()));

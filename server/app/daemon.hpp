@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "agents/frame_source.hpp"
 #include "emit/config/daemon_config.hpp"
@@ -28,6 +29,9 @@ struct DaemonOptions {
   /// Drops the privileges of the process beyond its user once the ports are open. It is for
   /// programs that are the daemon, because it cannot be undone.
   bool drop_privileges = false;
+  /// Program and arguments that explain a pixel of a run, up to those that name run and pixel
+  /// (server::Explainer); empty: none is there.
+  std::vector<std::string> explain_command;
   std::function<void(const std::string&)>
       on_log;  ///< null: spdlog as configured; set: log lines go here
 };

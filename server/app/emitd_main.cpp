@@ -9,8 +9,10 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <filesystem>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 #include "agents/receiver/receiver.hpp"
@@ -190,6 +192,21 @@ int fail(const char* program, const physics::Error& error) {
   return exit_code_of(error);
 }
 
+/// Returns how `emit` explains pixels of a scenario, where it lies beside this program.
+std::vector<std::string> explain_command(const std::filesystem::path& scenario,
+                                         const std::vector<std::string>& overrides) {
+  std::error_code error;
+  const auto own = std::filesystem::read_symlink("/proc/self/exe", error);
+  const std::filesystem::path emit = own.parent_path() / "emit";
+  if (error || scenario.empty() || ::access(emit.c_str(), X_OK) != 0) return {};
+  std::vector<std::string> out{emit.string(), "explain", scenario.string()};
+  for (const std::string& one : overrides) {
+    out.emplace_back("--set");
+    out.push_back(one);
+  }
+  return out;
+}
+
 int serve(const Arguments& arguments, const char* program) {
   if (!arguments.check) {
     handle_stop_signals();
@@ -238,6 +255,7 @@ int serve(const Arguments& arguments, const char* program) {
   DaemonOptions options;
   options.notifier = &notifier;
   options.drop_privileges = true;
+  options.explain_command = explain_command(daemon_config->scenario, overrides.scenario);
   auto daemon = Daemon::create(*daemon_config, std::move(scenario), std::move(options));
   if (!daemon) {
     return fail(program, daemon.error());

@@ -64,7 +64,20 @@ JournalPlayer::~JournalPlayer() {
 void JournalPlayer::release_shown() noexcept {
   for (const renderer::SlotIndex slot : shown_) source_.release(slot);
   shown_.clear();
+  shots_.clear();
   view_ = nullptr;
+}
+
+JournalPlayer::Shown JournalPlayer::shown_by(std::size_t channel) {
+  const Channel& wanted = channels_.channels[channel];
+  for (std::size_t i = 0; i < shots_.size(); ++i) {
+    const ShownShot& shot = shots_[i];
+    if (shot.camera != wanted.camera) continue;
+    const TakenPicture taken =
+        take_picture(channels_.pictures[wanted.picture], *shot.view, shown_[i], shot.moment);
+    return {shot.view, taken.pixels};
+  }
+  return {};
 }
 
 physics::Result<std::optional<ReplayedFrame>> JournalPlayer::apply(const v1::JournalEntry& entry) {
@@ -153,10 +166,10 @@ physics::Result<void> JournalPlayer::play_shot(const v1::FrameDecision& decision
   const glm::vec2 shift_px =
       ahead ? glm::vec2(decision.applied_ahead_shift_x_px(), decision.applied_ahead_shift_y_px())
             : glm::vec2(decision.applied_shift_x_px(), decision.applied_shift_y_px());
-  const std::uint32_t crc =
-      protocol::crc32c(std::as_bytes(take_picture(channels_.pictures[channel.picture], view,
-                                                  shown_.back(), {shift_px, rendered_number_})
-                                         .pixels));
+  const OutputChain::Moment moment{shift_px, rendered_number_};
+  shots_.push_back({channel.camera, &view, moment});
+  const std::uint32_t crc = protocol::crc32c(std::as_bytes(
+      take_picture(channels_.pictures[channel.picture], view, shown_.back(), moment).pixels));
   crcs_match_ = crcs_match_ && crc == shot.radiance_crc32c();
   if (shown_.size() == 1) {
     view_ = &view;

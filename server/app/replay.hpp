@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "agents/channel_table.hpp"
@@ -57,6 +58,17 @@ class JournalPlayer {
   /// slot.
   [[nodiscard]] physics::Result<std::optional<ReplayedFrame>> apply(const v1::JournalEntry& entry);
 
+  [[nodiscard]] const std::vector<Channel>& channels() const noexcept { return channels_.channels; }
+  [[nodiscard]] const std::vector<Picture>& pictures() const noexcept { return channels_.pictures; }
+  /// Image of a channel in the latest frame.
+  struct Shown {
+    const renderer::FrameView* view = nullptr;  ///< null: the channel does not show the frame
+    std::span<const float> pixels;
+  };
+  /// Returns what a channel shows, valid until the next apply().
+  /// @pre channel < channels().size()
+  [[nodiscard]] Shown shown_by(std::size_t channel);
+
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
   [[nodiscard]] std::uint64_t mismatches() const noexcept { return mismatches_; }
 
@@ -78,7 +90,14 @@ class JournalPlayer {
   std::uint64_t last_sequence_ = 0;
   bool started_ = false;
   std::vector<renderer::SlotIndex> shown_;  ///< slots of the last frame, kept for repeats
-  bool crcs_match_ = false;                 ///< of all its cameras
+  /// Camera, view and moment of the images in these slots.
+  struct ShownShot {
+    std::size_t camera = 0;
+    const renderer::FrameView* view = nullptr;
+    OutputChain::Moment moment;
+  };
+  std::vector<ShownShot> shots_;
+  bool crcs_match_ = false;  ///< of all its cameras
   const renderer::FrameView* view_ = nullptr;
   std::uint32_t view_crc_ = 0;
   std::vector<PendingWeather> weather_;  ///< accepted, but not used by a frame yet

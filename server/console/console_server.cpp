@@ -121,6 +121,7 @@ struct ConsoleServer::Impl {
   void watch_bell() {
     context.bells.console.arm();
     take_replies();
+    take_explanations();
     take_image();
     bell.async_wait(asio::posix::stream_descriptor::wait_read, [this](const error_code& ended) {
       watching = false;
@@ -157,6 +158,15 @@ struct ConsoleServer::Impl {
         if (page->page() == reply->origin.connection) page->give_answer(text);
       }
       context.console_replies.pop();
+    }
+  }
+
+  void take_explanations() {
+    while (auto explained = answers.explained()) {
+      const auto text = std::make_shared<const std::string>(std::move(explained->json));
+      for (ConsoleSession* page : std::vector(hub.pages.begin(), hub.pages.end())) {
+        if (page->page() == explained->page) page->give_answer(text);
+      }
     }
   }
 

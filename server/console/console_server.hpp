@@ -6,9 +6,11 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "console/console_tap.hpp"
+#include "console/explainer.hpp"
 #include "emit/physics/error.hpp"
 #include "net/socket_address.hpp"
 
@@ -30,6 +32,11 @@ class ConsoleServer {
 
   /// Called on the server's thread.
   struct Answers {
+    /// Answer to words about a replay.
+    struct Replayed {
+      bool ok = false;
+      std::string text;
+    };
     /// Whether this peer may connect; others are closed at once.
     std::function<bool(const SocketAddress&)> admits;
     /// Returns what a page is told first, JSON.
@@ -43,6 +50,13 @@ class ConsoleServer {
     /// Hands a command to the run. Returns why not; empty: it is on its way, and its answer comes
     /// through Context::console_replies.
     std::function<std::string(CommandKind command, bool local, std::uint32_t page)> command;
+    /// Begins to explain a pixel. Returns why not; empty: the answer comes by `explained`. The
+    /// channel exists; the rest is not checked.
+    std::function<std::string(const ExplainRequest&)> explain;
+    /// Returns an explanation that is done; it is asked when Doorbells::console rings.
+    std::function<std::optional<Explained>()> explained;
+    /// Takes words about the recording that is replayed. Empty function: nothing is replayed.
+    std::function<Replayed(std::string_view words)> replay = {};
   };
   struct Options {
     double rate_hz = 10.0;           ///< images a second, all pages together

@@ -3,11 +3,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <boost/beast/http/read.hpp>
 #include <boost/beast/http/write.hpp>
 #include <charconv>
 #include <chrono>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -184,6 +186,8 @@ void ConsoleSession::read_message() {
 void ConsoleSession::take_message(std::string_view text) {
   constexpr std::string_view kNext = "next ";
   constexpr std::string_view kCommand = "command ";
+  constexpr std::string_view kExplain = "explain ";
+  constexpr std::string_view kReplay = "replay ";
   if (text.starts_with(kNext)) {
     const auto channel = number_of(text.substr(kNext.size()));
     if (channel && *channel < hub_.channels) {
@@ -192,18 +196,54 @@ void ConsoleSession::take_message(std::string_view text) {
     }
   } else if (text.starts_with(kCommand)) {
     take_command(text.substr(kCommand.size()));
+  } else if (text.starts_with(kExplain)) {
+    take_question(text.substr(kExplain.size()));
+  } else if (text.starts_with(kReplay)) {
+    take_replay(text.substr(kReplay.size()));
   }
+}
+
+void ConsoleSession::take_question(std::string_view words) {
+  std::array<std::size_t, 4> numbers{};
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const std::size_t end = std::min(words.find(' '), words.size());
+    const auto number = number_of(words.substr(0, end));
+    const bool last = i + 1 == numbers.size();
+    if (!number || last != (end == words.size())) return;
+    numbers[i] = *number;
+    words.remove_prefix(std::min(end + 1, words.size()));
+  }
+  constexpr std::size_t kMost = std::numeric_limits<std::uint32_t>::max();
+  if (numbers[0] >= hub_.channels || numbers[1] > kMost || numbers[2] > kMost) return;
+  ExplainRequest request;
+  request.page = page_;
+  request.channel = numbers[0];
+  request.x_px = static_cast<std::uint32_t>(numbers[1]);
+  request.y_px = static_cast<std::uint32_t>(numbers[2]);
+  request.frame_number = numbers[3];
+  const std::string refusal = hub_.answers.explain(request);
+  if (!refusal.empty()) say_answer(false, "explain", refusal);
+}
+
+void ConsoleSession::take_replay(std::string_view words) {
+  if (!hub_.answers.replay) {
+    say_answer(false, "replay", "nothing is replayed here");
+    return;
+  }
+  const auto replayed = hub_.answers.replay(words);
+  say_answer(replayed.ok, "replay", replayed.text);
+}
+
+void ConsoleSession::say_answer(bool ok, std::string_view command, std::string_view text) {
+  give_answer(std::make_shared<const std::string>(fmt::format(
+      R"({{"type":"answer","ok":{},"command":"{}","text":{}}})", ok, command, json_string(text))));
 }
 
 void ConsoleSession::take_command(std::string_view word) {
   for (const auto& [name, command] : kCommands) {
     if (name != word) continue;
     const std::string refusal = hub_.answers.command(command, local_, page_);
-    if (!refusal.empty()) {
-      give_answer(std::make_shared<const std::string>(
-          fmt::format(R"({{"type":"answer","ok":false,"command":"{}","text":{}}})", name,
-                      json_string(refusal))));
-    }
+    if (!refusal.empty()) say_answer(false, name, refusal);
     return;
   }
 }

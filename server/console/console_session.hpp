@@ -68,6 +68,9 @@ class ConsoleSession : public std::enable_shared_from_this<ConsoleSession> {
   void read_message();
   void take_message(std::string_view text);
   void take_command(std::string_view word);
+  void take_question(std::string_view words);
+  void take_replay(std::string_view words);
+  void say_answer(bool ok, std::string_view command, std::string_view text);
   /// Sends what there is, the most urgent first, one message at a time.
   void pump();
   void write(boost::asio::const_buffer bytes, bool binary);

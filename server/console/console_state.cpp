@@ -205,6 +205,9 @@ std::string console_hello(const ConsoleFacts& facts, const Context& context, boo
       json_string(facts.device), facts.rate_hz, facts.budget_ns, facts.image_rate_hz, facts.motion,
       may_command, image::TemperatureTable::kFromK, image::TemperatureTable::kStepK,
       image::kNanColor[0], image::kNanColor[1], image::kNanColor[2]);
+  fmt::format_to(Out(text), R"(,"no_explanation":{},"recording":{})",
+                 json_string(facts.no_explanation),
+                 facts.recording.empty() ? std::string_view("null") : facts.recording);
   text += ",\"colors\":{\"thermal\":";
   add_colors(text, image::ColorMap::thermal);
   text += ",\"grey\":";
@@ -249,6 +252,8 @@ std::string console_status(Context& context, ConsoleTap& tap, const StatusBoard&
                    json_string(agent.first), us_between(0, agent.second->max_ns()),
                    agent.second->over_threshold(), us_between(0, agent.second->busy_ns()) / 1e6);
   });
+  fmt::format_to(Out(text), R"(,"replay":{})",
+                 moment.replay.empty() ? std::string_view("null") : moment.replay);
   text += ",\"axes\":";
   add_axes(text, context);
   text += ",\"picture\":";

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "agents/context.hpp"
@@ -22,6 +23,8 @@ struct ConsoleFacts {
   std::int64_t budget_ns = 0;   ///< host-step: time for a frame; 0: none
   double image_rate_hz = 10.0;  ///< largest rate of images
   bool motion = false;          ///< a motion simulator is driven
+  std::string no_explanation;   ///< why pixels cannot be explained; empty: they can
+  std::string recording;        ///< what is replayed, JSON; empty: nothing is
 };
 
 /// Returns the first message to a page, JSON.
@@ -34,6 +37,7 @@ struct ConsoleMoment {
   bool ready = false;
   std::int64_t uptime_ns = 0;
   std::size_t pages = 0;
+  std::string_view replay = {};  ///< state of the replay, JSON; empty: nothing is replayed
 };
 /// Returns the state of the daemon, JSON, with the ticks of the frames since the last call.
 [[nodiscard]] std::string console_status(Context& context, ConsoleTap& tap,

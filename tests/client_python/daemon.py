@@ -37,6 +37,9 @@ class Daemon:
         self._log = (self.folder / "stderr").open("wb")
         self.process = subprocess.Popen([BIN_DIR / "emitd", "--config", config], stdout=subprocess.PIPE,
                                         stderr=self._log)
+        self._take_ready_line()
+
+    def _take_ready_line(self):
         try:
             ready = self._read_ready_line()
         except BaseException:

@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 import tempfile
+import threading
 
 from cigi_host import OPERATE, CigiHost
 from daemon import BIN_DIR, Daemon
@@ -14,6 +15,49 @@ from daemon import BIN_DIR, Daemon
 WIDTH_PX, HEIGHT_PX = 160, 120
 STEP_NS = 5_000_000
 IG_CLOCK = 'mode = "ig-clock"\nrate_hz = 50.0'
+
+
+class SceneDaemon(Daemon):
+    """emitd with a rendered scenario, a console and a journal file."""
+
+    def __init__(self, scenario, pacing, overrides=(), source=""):
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="emitd_test_"))
+        self.journal = self.folder / "run.mcap"
+        self.shm = "none"
+        self.overrides = [argument for each in overrides for argument in ("--set", each)]
+        config = self.folder / "daemon.toml"
+        config.write_text(
+            f'scenario = "{scenario}"\n[source]\nkind = "renderer"\n{source}\n[pacing]\n{pacing}\n'
+            f'[host]\nudp = "127.0.0.1:0"\n[control]\ntcp = "127.0.0.1:0"\n[journal]\nfile = "{self.journal}"\n'
+            f'[console]\nlisten = "127.0.0.1:0"\nrate_hz = 20.0\n')
+        self._log = (self.folder / "stderr").open("wb")
+        self.process = subprocess.Popen([BIN_DIR / "emitd", "--config", config, *self.overrides],
+                                        stdout=subprocess.PIPE, stderr=self._log)
+        self._take_ready_line()
+
+
+@contextlib.contextmanager
+def replay_console(journal, scenario, overrides, *more):
+    """`emit replay` with a console, on a free port. Yields its address."""
+    process = subprocess.Popen(
+        [BIN_DIR / "emit", "replay", journal, "--scenario", scenario, *overrides, "--console", "127.0.0.1:0", *more],
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    reader = None
+    try:
+        for line in process.stderr:
+            if "console=http://" in line:
+                # What follows is read on, so that the pipe does not fill up.
+                reader = threading.Thread(target=process.stderr.read)
+                reader.start()
+                yield line.split("console=http://")[1].strip().rstrip("/")
+                return
+        raise AssertionError("emit replay has no console")
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.wait(60)
+        if reader is not None:
+            reader.join()
+        process.stderr.close()
 
 
 def start(pacing, address="127.0.0.1:0", more="", head=""):

@@ -84,6 +84,7 @@ int Recorder::do_work(std::int64_t now_ns) noexcept {
     work += take_writable();
     work += send_all();
     discard_old();
+    answer_tap();
     const std::uint64_t end = kept_first_ + kept_.size();
     if (std::all_of(peers_.begin(), peers_.end(),
                     [end](const Peer& peer) { return peer.next == end; })) {
@@ -268,6 +269,15 @@ void Recorder::discard_old() {
     }
   }
   context_.journal_memory_bytes.store(kept_bytes_, std::memory_order_relaxed);
+}
+
+void Recorder::answer_tap() {
+  if (tap_ == nullptr || !tap_->is_asked()) return;
+  tap_->begin(kept_bytes_);
+  for (const Kept& kept : kept_) {
+    if (kept.sequence >= run_first_sequence_) tap_->add(kept.bytes);
+  }
+  tap_->finish();
 }
 
 int Recorder::take_writable() noexcept {

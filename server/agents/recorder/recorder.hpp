@@ -10,6 +10,7 @@
 
 #include "agents/agent.hpp"
 #include "agents/context.hpp"
+#include "agents/journal_tap.hpp"
 #include "emit/config/daemon_config.hpp"
 #include "emit/protocol/record/log.hpp"
 #include "rt/fd.hpp"
@@ -38,6 +39,8 @@ class Recorder final : public Agent {
 
   /// Sets the members of RunStart. Call it before start.
   void set_identity(Identity identity) { identity_ = std::move(identity); }
+  /// Sets who may ask for the entries that are kept in memory. Call it before start; null: nobody.
+  void set_tap(JournalTap* tap) { tap_ = tap; }
   /// State of the journal file after open().
   struct Opened {
     std::filesystem::path older;  ///< new name of an earlier process's journal; empty: none
@@ -93,6 +96,8 @@ class Recorder final : public Agent {
   void add_peer(const RecorderCommand& command);
   void end_stream(Peer& peer) noexcept;
   void discard_old();
+  /// Hands what is kept of the run to whoever has asked for it.
+  void answer_tap();
   void remove(std::size_t index) noexcept;
   void file_failed(const physics::Error& error) noexcept;
   void flush_when_due(std::int64_t now_ns);
@@ -102,6 +107,7 @@ class Recorder final : public Agent {
   Context& context_;
   config::JournalConfig config_;
   Identity identity_;
+  JournalTap* tap_ = nullptr;
   Fd epoll_;
   std::optional<protocol::LogWriter> file_;
   std::uint64_t handed_to_file_ = 0;  // entries of this process

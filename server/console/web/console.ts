@@ -2,29 +2,36 @@
 // The operator's console: wires image, limits, probes, strips and commands together.
 
 import { AxesPanel } from "./axes.js";
-import { colorTable, cssColor, PROBE_COLORS, reversed } from "./colors.js";
+import { drawColorBar } from "./bar.js";
+import { colorTable, PROBE_COLORS, reversed } from "./colors.js";
 import { channelName, duration, element, Panels, Toast } from "./display.js";
+import { ExplainPanel, Explanation } from "./explain.js";
 import { ImageView, percentiles, Point } from "./image.js";
+import { Keyed, keyTable } from "./key_table.js";
 import { bindKeys } from "./keys.js";
 import { Answer, Frame, Hello, Link, Picture, Status } from "./link.js";
+import { PacePanel } from "./pace.js";
 import { MAX_PROBES, Probes } from "./probes.js";
-import { Series, Strip, ticks } from "./strips.js";
+import { ReplayBar } from "./replay.js";
+import { Strip } from "./strips.js";
 import { fetchTable, TemperatureTable } from "./temperature.js";
 
 const COMMANDS = ["start", "stop", "hold", "step", "reset"];
 const AUTO_PERIOD_MS = 500;
 const PROBE_SECONDS = 60;
-const FRAME_SECONDS = 10;
 const STALE_S = 2;
 /** A reset is asked for twice within this time. */
 const CONFIRM_MS = 3000;
 
-class Console {
+class Console implements Keyed {
   private readonly image = new ImageView(element("image"), element("overlay"));
   private readonly panels = new Panels();
-  private readonly axes = new AxesPanel();
+  readonly axes = new AxesPanel();
+  private readonly pace = new PacePanel();
   private readonly toast = new Toast();
   private readonly probes = new Probes();
+  readonly explain = new ExplainPanel(() => this.explainChanged());
+  readonly replay = new ReplayBar(() => this.link, (text) => this.toast.show(text, true));
   private readonly link: Link;
   private facts: Hello | null = null;
   private tables = new Map<number, TemperatureTable>();
@@ -44,21 +51,11 @@ class Console {
   private frames: number[] = [];
   private resetAt = -Infinity;
   private runId = "";
-  private readonly frameTimes = new Series("#6fd3ff", 4096);
-  private readonly latencies = new Series("#9bef8b", 4096);
   private readonly probeStrip: Strip;
-  private readonly frameStrip: Strip;
-  private readonly latencyStrip: Strip;
 
   constructor() {
     this.probeStrip = new Strip(element("probe-strip"), this.probes.shown, {
       seconds: PROBE_SECONDS, fromZero: false, unit: "", dots: false,
-    });
-    this.frameStrip = new Strip(element("frame-strip"), [this.frameTimes], {
-      seconds: FRAME_SECONDS, fromZero: true, unit: "ms", dots: true,
-    });
-    this.latencyStrip = new Strip(element("latency-strip"), [this.latencies], {
-      seconds: FRAME_SECONDS, fromZero: true, unit: "ms", dots: true,
     });
     this.restore();
     this.bind();
@@ -75,6 +72,8 @@ class Console {
     if (this.channel >= hello.channels.length) this.channel = 0;
     this.panels.hello(hello);
     this.axes.show(hello.motion);
+    this.explain.hello(hello.no_explanation);
+    this.replay.hello(hello.recording);
     element("title").textContent = hello.scenario || "canned frames";
     element("about").textContent = `${hello.software} \u00b7 ${hello.pacing} \u00b7 ${hello.device}`;
     const select = element<HTMLSelectElement>("channel");
@@ -94,7 +93,7 @@ class Console {
     this.takePicture(status.picture);
     const state = !status.running ? "stopped" : status.held ? "held" : "running";
     const pill = element("state");
-    pill.textContent = status.ready ? state : "not ready";
+    pill.textContent = status.ready ? (this.replay.status(status.replay) ?? state) : "not ready";
     pill.className = `pill ${status.ready ? state : "stopped"}`;
     element("start").classList.toggle("on", state === "running");
     element("stop").classList.toggle("on", state === "stopped");
@@ -102,37 +101,18 @@ class Console {
     element("uptime").textContent = `up ${duration(status.uptime_s)}`;
     if (status.run_id !== this.runId) {
       this.runId = status.run_id;
-      this.frameTimes.clear();
-      this.latencies.clear();
+      this.pace.clear();
     }
-    this.takeTicks(status);
-  }
-
-  private takeTicks(status: Status): void {
-    const now = performance.now() / 1000;
-    let late = 0;
-    for (const tick of status.ticks) {
-      const [, flags, ageMs, frameUs, frameDeadlineUs, latencyUs, latencyDeadlineUs] = tick;
-      const time = now - ageMs / 1000;
-      if (frameUs !== null && (flags & 2) === 0) this.frameTimes.add(time, frameUs / 1000);
-      if (latencyUs !== null) this.latencies.add(time, latencyUs / 1000);
-      if (frameDeadlineUs !== null) this.frameStrip.deadline = frameDeadlineUs / 1000;
-      if (latencyDeadlineUs !== null) this.latencyStrip.deadline = latencyDeadlineUs / 1000;
-      if ((flags & 1) !== 0) ++late;
-    }
-    if (late > 0) element("late").classList.add("flash");
-    else element("late").classList.remove("flash");
-    const lateCount = status.counters["frames_late"] ?? 0;
-    const repeated = status.counters["frames_repeated"] ?? 0;
-    element("late").textContent = `${lateCount} late, ${repeated} repeated`;
-    element("frame-value").textContent = `${this.frameTimes.last.toFixed(2)} ms`;
-    element("latency-value").textContent = Number.isNaN(this.latencies.last) ? "" : `${this.latencies.last.toFixed(2)} ms`;
-    this.frameStrip.draw(now);
-    this.latencyStrip.draw(now);
+    this.pace.take(status);
   }
 
   answer(answer: Answer): void {
-    this.toast.answer(answer);
+    if (answer.command === "explain") this.explain.refuse(answer.text);
+    else this.toast.answer(answer);
+  }
+
+  explanation(explanation: Explanation): void {
+    this.explain.take(explanation);
   }
 
   frame(frame: Frame): void {
@@ -318,7 +298,7 @@ class Console {
     this.drawBar();
   }
 
-  private moveLimit(which: "low" | "high", steps: number): void {
+  moveLimit(which: "low" | "high", steps: number): void {
     const step = (this.high - this.low) / 40;
     this.setAuto(false);
     if (which === "low") this.low = Math.min(this.low + steps * step, this.high - step);
@@ -350,33 +330,7 @@ class Console {
   }
 
   private drawBar(): void {
-    const canvas = element<HTMLCanvasElement>("bar");
-    const context = canvas.getContext("2d");
-    if (context === null) return;
-    const ratio = window.devicePixelRatio || 1;
-    const width = canvas.clientWidth;
-    const height = canvas.clientHeight;
-    canvas.width = Math.round(width * ratio);
-    canvas.height = Math.round(height * ratio);
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    context.clearRect(0, 0, width, height);
-    const top = 8;
-    const bottom = height - 8;
-    for (let y = top; y < bottom; ++y) {
-      const entry = Math.round(((bottom - 1 - y) / (bottom - 1 - top)) * 255);
-      context.fillStyle = cssColor(this.colors, entry);
-      context.fillRect(0, y, 14, 1);
-    }
-    context.font = '11px "DejaVu Sans", sans-serif';
-    context.fillStyle = "#8fa1b3";
-    const marks = ticks(this.low, this.high, Math.max(2, Math.floor(height / 60)));
-    const step = marks.length > 1 ? marks[1] - marks[0] : 1;
-    const decimals = Math.min(6, Math.max(0, Math.ceil(-Math.log10(step) - 1e-9)));
-    for (const mark of marks) {
-      const y = bottom - ((mark - this.low) / (this.high - this.low)) * (bottom - top);
-      context.fillRect(14, Math.round(y), 4, 1);
-      context.fillText(mark.toFixed(decimals), 21, y + 4);
-    }
+    drawColorBar(element("bar"), this.colors, this.low, this.high);
   }
 
   // Cursor and probes.
@@ -400,17 +354,15 @@ class Console {
     while (list.children.length < MAX_PROBES) {
       const item = document.createElement("button");
       const index = list.children.length;
-      item.title = "Press to take the probe away";
-      item.onclick = () => {
-        this.probes.takeAway(index);
-        this.probesChanged();
-      };
+      item.title = "Press to see how the surface came to its temperature";
+      item.onclick = () => this.chooseProbe(index);
       item.style.color = PROBE_COLORS[index];
       list.append(item);
     }
     texts.forEach((text, i) => {
       const item = list.children[i] as HTMLElement;
       item.hidden = text === "";
+      item.classList.toggle("on", i === this.explain.chosen);
       item.textContent = `${i + 1}  ${text}`;
     });
     element("probe-hint").hidden = texts.some((text) => text !== "");
@@ -420,10 +372,49 @@ class Console {
 
   private toggleProbe(point: Point): void {
     const reach = Math.max(3, this.image.size.x / 80);
-    if (!this.probes.takeAwayAt(point, reach) && this.probes.put(point) < 0) {
-      this.toast.show(`there are at most ${MAX_PROBES} probes`, false);
-    }
+    const taken = this.probes.takeAwayAt(point, reach);
+    const put = taken < 0 ? this.probes.put(point) : -1;
+    if (taken >= 0) this.explain.forget(taken);
+    else if (put < 0) this.toast.show(`there are at most ${MAX_PROBES} probes`, false);
     this.probesChanged();
+    if (put >= 0 && this.facts?.no_explanation === "") this.chooseProbe(put);
+  }
+
+  /** Shows how the surface under a probe came to its temperature; of the chosen one, as of now. */
+  private chooseProbe(index: number): void {
+    const place = this.probes.places[index];
+    if (place === null) return;
+    if (index === this.explain.chosen) this.explain.again(place, this.channel, this.image.frame, this.link);
+    else this.explain.choose(index, place, this.channel, this.image.frame, this.link);
+  }
+
+  nextProbe(): void {
+    const count = this.probes.places.length;
+    for (let i = 1; i <= count; ++i) {
+      const index = (this.explain.chosen + i + count) % count;
+      if (this.probes.places[index] !== null) {
+        this.chooseProbe(index);
+        return;
+      }
+    }
+    this.toast.show("put a probe first", false);
+  }
+
+  takeAwayProbe(): void {
+    const taken = this.explain.chosen >= 0 ? this.explain.chosen : this.probes.last();
+    if (taken < 0) return;
+    this.probes.takeAway(taken);
+    this.explain.forget(taken);
+    this.probesChanged();
+  }
+
+  private explainChanged(): void {
+    this.explain.draw(this.facts?.channels ?? []);
+    if (this.image.frame !== null) this.showReadings();
+  }
+
+  toggleProbeAtCursor(): void {
+    if (this.cursor !== null) this.toggleProbe(this.cursor);
   }
 
   private probesChanged(): void {
@@ -434,7 +425,7 @@ class Console {
     this.showReadings();
   }
 
-  private moveCursor(dx: number, dy: number): void {
+  moveCursor(dx: number, dy: number): void {
     const size = this.image.size;
     if (size.x === 0) return;
     const from = this.cursor ?? { x: size.x >> 1, y: size.y >> 1 };
@@ -457,13 +448,16 @@ class Console {
     this.image.layout();
     this.drawBar();
     this.redraw();
+    this.explain.draw(this.facts?.channels ?? []);
   }
 
   /** Says so when the image is old. */
   private look(): void {
+    this.explain.tick();
     const age = (performance.now() - this.frameAt) / 1000;
     const box = element("stale");
-    box.hidden = this.frameAt !== 0 && !this.image.blank && (age < STALE_S || this.frozen);
+    const waits = this.frozen || (this.replay.active && this.replay.state?.playing === false);
+    box.hidden = this.frameAt !== 0 && !this.image.blank && (age < STALE_S || waits);
     if (!this.link.connected) box.textContent = "No connection to emitd. Trying again.";
     else if (this.frameAt === 0) box.textContent = "No frame yet.";
     else if (this.image.blank) box.textContent = "The host has switched the sensor off.";
@@ -474,7 +468,7 @@ class Console {
     element("image-rate").textContent = `${rate.toFixed(1)} images/s`;
   }
 
-  private command(word: string): void {
+  command(word: string): void {
     if (word === "reset" && performance.now() - this.resetAt > CONFIRM_MS) {
       this.resetAt = performance.now();
       this.toast.show("reset ends the run: press once more to confirm", false);
@@ -485,24 +479,24 @@ class Console {
     else this.toast.show("console.commands does not allow commands from here", false);
   }
 
-  private toggleFreeze(): void {
+  toggleFreeze(): void {
     this.frozen = !this.frozen;
     element("freeze").classList.toggle("on", this.frozen);
     document.body.classList.toggle("frozen", this.frozen);
     if (!this.frozen) this.link.next(this.channel);
   }
 
-  private toggleHelp(): void {
+  toggleHelp(): void {
     element("help").hidden = !element("help").hidden;
   }
 
-  private toggleMap(): void {
+  toggleMap(): void {
     this.map = this.map === "thermal" ? "grey" : "thermal";
     this.applyMap();
     this.save();
   }
 
-  private toggleQuantity(): void {
+  toggleQuantity(): void {
     const was = this.showsKelvins;
     this.kelvins = !this.kelvins;
     if (!this.auto && this.table !== undefined && was !== this.showsKelvins) {
@@ -515,11 +509,11 @@ class Console {
     this.save();
   }
 
-  private toggleAuto(): void {
+  toggleAuto(): void {
     this.setAuto(!this.auto);
   }
 
-  private nextChannel(step: number): void {
+  nextChannel(step: number): void {
     const count = this.facts?.channels.length ?? 0;
     if (count > 0) this.chooseChannel((this.channel + step + count) % count);
   }
@@ -559,41 +553,7 @@ class Console {
       this.showReadings();
     };
     new ResizeObserver(() => this.relayout()).observe(element("picture"));
-    const arrow = (name: string, dx: number, dy: number, label: string, help: string) => ({
-      keys: [name], label, help,
-      run: (event: KeyboardEvent) => this.moveCursor((event.shiftKey ? 10 : 1) * dx, (event.shiftKey ? 10 : 1) * dy),
-    });
-    bindKeys(
-      [
-        { keys: ["?"], label: "?", help: "This list", run: () => this.toggleHelp() },
-        { keys: ["s"], label: "S", help: "Start", run: () => this.command("start") },
-        { keys: ["x"], label: "X", help: "Stop", run: () => this.command("stop") },
-        { keys: ["h"], label: "H", help: "Hold: the thermal clock stands still", run: () => this.command("hold") },
-        { keys: ["n"], label: "N", help: "Step: one frame while stopped or held", run: () => this.command("step") },
-        { keys: ["z"], label: "Z Z", help: "Reset the run (twice within 3 s)", run: () => this.command("reset") },
-        { keys: [" ", "f"], label: "Space", help: "Freeze the display, not the run", run: () => this.toggleFreeze() },
-        { keys: ["t"], label: "T", help: "Temperature or radiance", run: () => this.toggleQuantity() },
-        { keys: ["m"], label: "M", help: "Colour map", run: () => this.toggleMap() },
-        { keys: ["r"], label: "R", help: "Limits by percentile or of the host, or keep them", run: () => this.toggleAuto() },
-        { keys: ["-"], label: "-  =", help: "Lower limit down, up", run: () => this.moveLimit("low", -1) },
-        { keys: ["="], label: "", help: "", run: () => this.moveLimit("low", 1) },
-        { keys: [","], label: ",  .", help: "Upper limit down, up", run: () => this.moveLimit("high", -1) },
-        { keys: ["."], label: "", help: "", run: () => this.moveLimit("high", 1) },
-        { keys: ["j"], label: "J  K", help: "Next, previous channel", run: () => this.nextChannel(1) },
-        { keys: ["k"], label: "", help: "", run: () => this.nextChannel(-1) },
-        { keys: ["a"], label: "A", help: "Next axis of the motion simulator", run: () => this.axes.next() },
-        arrow("ArrowLeft", -1, 0, "Arrows", "Move the cursor by a pixel, with Shift by ten"),
-        arrow("ArrowRight", 1, 0, "", ""),
-        arrow("ArrowUp", 0, -1, "", ""),
-        arrow("ArrowDown", 0, 1, "", ""),
-        { keys: ["Enter", "p"], label: "Enter", help: "Put a probe at the cursor, or take it away",
-          run: () => { if (this.cursor !== null) this.toggleProbe(this.cursor); } },
-        { keys: ["Delete", "Backspace"], label: "Del", help: "Take away the last probe",
-          run: () => { this.probes.takeAwayLast(); this.probesChanged(); } },
-        { keys: ["Escape"], label: "Esc", help: "Close this list", run: () => { element("help").hidden = true; } },
-      ],
-      element("help-keys"),
-    );
+    bindKeys(keyTable(this), element("help-keys"));
   }
 
   // Probes and choices outlive a reload.

@@ -154,6 +154,7 @@ export class Toast {
   }
 
   answer(answer: Answer): void {
-    this.show(answer.ok ? `${answer.command}: done` : `${answer.command}: ${answer.text}`, answer.ok);
+    const text = answer.command === "replay" ? answer.text : `${answer.command}: ${answer.ok ? "done" : answer.text}`;
+    this.show(text, answer.ok);
   }
 }

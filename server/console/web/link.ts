@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The connection to emitd: what it sends, and how the page comes back after a restart.
 
+import { Explanation } from "./explain.js";
+import { Point } from "./image.js";
+import { Recording, ReplayState } from "./replay.js";
+
 export interface Channel {
   index: number;
   name: string;
@@ -32,6 +36,9 @@ export interface Hello {
   table_step_k: number;
   nan_color: string;
   colors: Record<string, string>;
+  /** Why pixels cannot be explained; empty: they can. */
+  no_explanation: string;
+  recording: Recording | null;
   channels: Channel[];
   flags: string[];
   counters: [string, string][];
@@ -91,6 +98,7 @@ export interface Status {
   clients: Client[];
   warnings: Warning[];
   agents: { name: string; max_us: number; over: number; busy_s: number }[];
+  replay: ReplayState | null;
   axes: Axes;
   picture: Picture | null;
   ticks: Tick[];
@@ -172,6 +180,7 @@ export interface Listener {
   hello(hello: Hello): void;
   status(status: Status): void;
   answer(answer: Answer): void;
+  explanation(explanation: Explanation): void;
   frame(frame: Frame): void;
   lost(): void;
 }
@@ -201,6 +210,15 @@ export class Link {
 
   command(word: string): void {
     this.send(`command ${word}`);
+  }
+
+  /** Asks how the surface in a pixel of a frame came to its temperature. */
+  explain(channel: number, point: Point, frame: number): void {
+    this.send(`explain ${channel} ${point.x} ${point.y} ${frame}`);
+  }
+
+  replay(words: string): void {
+    this.send(`replay ${words}`);
   }
 
   get connected(): boolean {
@@ -237,6 +255,7 @@ export class Link {
     const message = JSON.parse(text) as { type: string };
     if (message.type === "hello") this.listener.hello(message as unknown as Hello);
     else if (message.type === "status") this.listener.status(message as unknown as Status);
+    else if (message.type === "explanation") this.listener.explanation(message as unknown as Explanation);
     else if (message.type === "answer") this.listener.answer(message as unknown as Answer);
   }
 

@@ -27,8 +27,8 @@ export class Probes {
     this.shown[index].clear();
   }
 
-  /** Takes away the probe within some pixels of a place. Returns false when there is none. */
-  takeAwayAt(point: Point, reachPx: number): boolean {
+  /** Takes away the probe within some pixels of a place. Returns its index; -1: there is none. */
+  takeAwayAt(point: Point, reachPx: number): number {
     let best = -1;
     let nearest = reachPx;
     this.places.forEach((place, i) => {
@@ -39,9 +39,8 @@ export class Probes {
         best = i;
       }
     });
-    if (best < 0) return false;
-    this.takeAway(best);
-    return true;
+    if (best >= 0) this.takeAway(best);
+    return best;
   }
 
   takeAway(index: number): void {
@@ -50,13 +49,13 @@ export class Probes {
     this.shown[index].clear();
   }
 
-  takeAwayLast(): void {
-    for (let i = MAX_PROBES - 1; i >= 0; --i) {
-      if (this.places[i] !== null) {
-        this.takeAway(i);
-        return;
-      }
-    }
+  /** Returns the index of the last probe; -1: there is none. */
+  last(): number {
+    let found = -1;
+    this.places.forEach((place, i) => {
+      if (place !== null) found = i;
+    });
+    return found;
   }
 
   /** Keeps the values of a new frame. */

@@ -56,6 +56,21 @@ export function ticks(low: number, high: number, count: number): number[] {
   return out;
 }
 
+/** Gives a canvas the size that it is shown with. Returns its context; null: it is not shown. */
+export function prepared(canvas: HTMLCanvasElement): CanvasRenderingContext2D | null {
+  const context = canvas.getContext("2d");
+  const ratio = window.devicePixelRatio || 1;
+  const width = Math.round(canvas.clientWidth * ratio);
+  const height = Math.round(canvas.clientHeight * ratio);
+  if (context === null || width === 0 || height === 0) return null;
+  if (canvas.width !== width || canvas.height !== height) {
+    canvas.width = width;
+    canvas.height = height;
+  }
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  return context;
+}
+
 export interface StripOptions {
   seconds: number;
   fromZero: boolean;
@@ -75,17 +90,10 @@ export class Strip {
   ) {}
 
   draw(now: number): void {
-    const context = this.canvas.getContext("2d");
+    const context = prepared(this.canvas);
     if (context === null) return;
-    const ratio = window.devicePixelRatio || 1;
     const width = this.canvas.clientWidth;
     const height = this.canvas.clientHeight;
-    if (width === 0 || height === 0) return;
-    if (this.canvas.width !== Math.round(width * ratio) || this.canvas.height !== Math.round(height * ratio)) {
-      this.canvas.width = Math.round(width * ratio);
-      this.canvas.height = Math.round(height * ratio);
-    }
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.fillStyle = BACKGROUND;
     context.fillRect(0, 0, width, height);
     const from = now - this.options.seconds;

@@ -2,10 +2,12 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <memory>
 #include <optional>
 
 #include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
+#include "tool/replay/replay_console.hpp"
 #include "tool/streams/journal_replay.hpp"
 #include "tool/streams/step_input.hpp"
 #include "tool/support/console.hpp"
@@ -24,6 +26,7 @@ struct ReplayOptions {
   std::string png_of = "apparent";
   std::string speed = "max";
   bool step = false;
+  std::string console;
   std::optional<double> from_s;
   std::optional<double> to_s;
   std::optional<std::uint64_t> run_id;
@@ -45,7 +48,8 @@ physics::Result<JournalReplayOptions> journal_options(const ReplayOptions& comma
   if (!until_ns) return tl::unexpected(until_ns.error());
   JournalReplayOptions options;
   options.log = command.log;
-  options.speed = *speed;
+  // The console paces its replay itself.
+  options.speed = command.console.empty() ? *speed : 0.0;
   options.from_ns = *from_ns;
   options.to_ns = *until_ns;
   options.run_id = command.run_id;
@@ -154,7 +158,11 @@ int run(const ReplayOptions& command) {
   const InterruptGuard interrupt;
   StepInput input(STDIN_FILENO);
   ReplayHooks hooks;
-  if (command.step) hooks.go_on = [&] { return input.wait_for_line(); };
+  if (command.step) {
+    hooks.order = [&](std::uint64_t) {
+      return input.wait_for_line() ? ReplayOrder::show : ReplayOrder::end;
+    };
+  }
   hooks.on_frame = [&](const server::ReplayedFrame& frame,
                        std::uint64_t pass) -> physics::Result<void> {
     if (!frame.matches) {
@@ -172,7 +180,16 @@ int run(const ReplayOptions& command) {
     return folder && pass == 1 ? folder->write(frame) : physics::Result<void>();
   };
   SystemReplayClock clock;
-  const auto summary = replay_journal(renderer_bench(*scenario, *options, clock), *options, hooks);
+  const ReplayBench bench = renderer_bench(*scenario, *options, clock);
+  std::unique_ptr<ReplayConsole> console;
+  if (!command.console.empty()) {
+    auto made = ReplayConsole::create(
+        bench, command.log, {command.console, *parse_speed(command.speed), scenario->name});
+    if (!made) return fail_call(made.error());
+    console = std::move(*made);
+    console->attach(hooks);
+  }
+  const auto summary = replay_journal(bench, *options, hooks);
   if (!summary) return fail_call(summary.error());
 
   fmt::print(text_stream(command.json), "{}", text_of(*summary, command));
@@ -201,10 +218,17 @@ void add_options(CommandLine& line, ReplayOptions& options) {
                              "goes. Frames that come late are not left out")
                      .type_name("X")
                      .show_default();
-  line.flag("--step", options.step,
-            "Show one frame for each line of standard input, e.g. Enter; the line q or the end of "
-            "the input ends the replay")
-      .excludes(speed);
+  Option step = line.flag("--step", options.step,
+                          "Show one frame for each line of standard input, e.g. Enter; the line q "
+                          "or the end of the input ends the replay")
+                    .excludes(speed);
+  Option console =
+      line.option("--console", options.console,
+                  "Serve the operator's console at this address:port of this host, e.g. "
+                  "127.0.0.1:7003: a page with a bar of the recording's time that holds, steps, "
+                  "seeks, loops and paces the replay, until it is interrupted")
+          .type_name("ADDRESS")
+          .excludes(step);
   line.option("--from-s", options.from_s,
               "First simulation time shown; default: the begin. What comes before it is rendered "
               "without being shown, so that the frames are those of a whole replay")
@@ -219,7 +243,8 @@ void add_options(CommandLine& line, ReplayOptions& options) {
               "Play so many times, each from the same state; 0: until interrupted. Files are "
               "written once")
       .type_name("N")
-      .show_default();
+      .show_default()
+      .excludes(console);
   line.flag("--anyway", options.anyway,
             "Replay although scenario or channels are not those of the recording");
   add_gpu(line, options.gpu_index);

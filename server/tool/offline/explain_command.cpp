@@ -3,6 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <sched.h>
+#include <sys/resource.h>
+
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -12,11 +15,14 @@
 #include <vector>
 
 #include "emit/physics/apparent_temperature.hpp"
+#include "emit/renderer/devices.hpp"
 #include "tool/command_line/common_options.hpp"
+#include "tool/offline/equilibrium.hpp"
 #include "tool/offline/explain_report.hpp"
 #include "tool/offline/offline_frames.hpp"
 #include "tool/offline/probe_points.hpp"
 #include "tool/offline/probe_run.hpp"
+#include "tool/offline/recorded_run.hpp"
 #include "tool/report/html_page.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
@@ -30,25 +36,37 @@ using physics::Result;
 
 struct ExplainOptions {
   ScenarioChoice input;
-  double time_s = 0.0;
+  std::optional<double> time_s;
+  std::optional<std::filesystem::path> run;
+  std::optional<std::uint64_t> frame;
   std::string px;
   double hours = 24.0;
+  bool background = false;
   std::optional<std::filesystem::path> json;
   std::optional<std::filesystem::path> html;
   int gpu_index = -1;
 };
 
+/// Lets every other program go first, now and in the threads that begin later.
+void go_into_background() {
+  constexpr int kNice = 19;
+  ::setpriority(PRIO_PROCESS, 0, kNice);
+  const sched_param none{};
+  // The nice value remains if the kernel refuses the idle class.
+  static_cast<void>(::sched_setscheduler(0, SCHED_IDLE, &none));
+}
+
 /// Renders the pixel and splits its radiance.
 Result<void> explain_frame(const scene::ScenarioDesc& scenario, const ProbeFinder& finder,
-                           const ProbePoint& pixel, const ExplainOptions& command,
-                           Explanation& found, std::optional<ProbePlace>& place) {
-  std::vector<OfflineShot> shots = sensor_shots(scenario, std::span(&command.time_s, 1));
+                           const ProbePoint& pixel, int gpu_index, Explanation& found,
+                           std::optional<ProbePlace>& place) {
+  std::vector<OfflineShot> shots = sensor_shots(scenario, std::span(&found.time_s, 1));
   shots[0].window_px = {pixel.x_px, pixel.y_px, 1, 1};
   place = finder.place(pixel, shots[0].sim_time_ns, shots[0].sensor_pose);
   renderer::OutputOptions output;
   output.temperature = output.depth = output.object = output.sun = output.sky = output.terms = true;
   output.slots = 2;
-  auto frames = OfflineFrames::create(scenario, shots, output, command.gpu_index);
+  auto frames = OfflineFrames::create(scenario, shots, output, gpu_index);
   if (!frames) return tl::unexpected(std::move(frames.error()));
   const auto next = (*frames)->next();
   if (!next) return tl::unexpected(next.error());
@@ -56,8 +74,12 @@ Result<void> explain_frame(const scene::ScenarioDesc& scenario, const ProbeFinde
   const std::size_t i = std::size_t{pixel.y_px} * view.width_px + pixel.x_px;
   if (std::isfinite(view.depth_m[i])) {
     ExplainedSurface surface;
-    surface.object = scenario.objects[static_cast<std::size_t>(view.object_id[i]) - 1].name;
-    surface.material = finder.material_name(static_cast<std::size_t>(view.material[i]));
+    const scene::ObjectDesc& object =
+        scenario.objects[static_cast<std::size_t>(view.object_id[i]) - 1];
+    surface.object = object.name;
+    surface.is_entity = object.entity_id != 0;
+    surface.material_index = static_cast<std::size_t>(view.material[i]);
+    surface.material = finder.material_name(surface.material_index);
     const glm::dvec3 ray = shots[0].sensor_pose.world_from_body *
                            pixel_direction_body(scenario.sensor, pixel.x_px, pixel.y_px);
     const glm::dvec3 boresight = shots[0].sensor_pose.world_from_body * glm::dvec3(1.0, 0.0, 0.0);
@@ -95,8 +117,50 @@ Result<void> explain_frame(const scene::ScenarioDesc& scenario, const ProbeFinde
   return {};
 }
 
+/// Adds what the surface would take without memory to its history. An entity has the film of its
+/// own flow, which only the renderer knows.
+Result<void> add_equilibrium(const scene::ScenarioDesc& scenario, const ProbeFinder& finder,
+                             Explanation& found) {
+  const ProbeRun& run = *found.history;
+  found.equilibrium_k.assign(run.rows().size(), std::numeric_limits<double>::quiet_NaN());
+  if (!found.surface || found.surface->is_entity) return {};
+  const auto model = Equilibrium::create(scenario, finder.materials());
+  if (!model) return tl::unexpected(model.error());
+  const auto forcing = ProbeForcing::create(scenario, run.times_s());
+  if (!forcing) return tl::unexpected(forcing.error());
+  for (std::size_t i = 0; i < run.rows().size(); ++i) {
+    const ProbeRow& row = run.rows()[i];
+    if (!row.place) continue;
+    found.equilibrium_k[i] = model->at_k(found.surface->material_index, forcing->at(i),
+                                         {row.place->normal, row.sun_w_m2, row.sky_frac});
+  }
+  return {};
+}
+
+/// Finds the instant that is asked for. A recorded run changes the scenario.
+Result<double> instant_of(const ExplainOptions& command, scene::ScenarioDesc& scenario) {
+  if (!command.run) {
+    if (!command.time_s) {
+      return physics::make_error(physics::ErrorCode::invalid_argument,
+                                 "--time-s says which instant, or --run a recorded run");
+    }
+    if (auto time_ns = sim_time_ns("--time-s", command.time_s); !time_ns) {
+      return tl::unexpected(std::move(time_ns.error()));
+    }
+    return *command.time_s;
+  }
+  const auto frame = follow_recording(*command.run, command.frame, scenario);
+  if (!frame) return tl::unexpected(frame.error());
+  for (const std::string& note : frame->notes) warn(note);
+  return 1e-9 * static_cast<double>(frame->sim_time_ns);
+}
+
 Result<Explanation> explain(const ExplainOptions& command, scene::ScenarioDesc scenario) {
   const InterruptGuard interrupt;
+  const int gpu_index = command.background ? renderer::kSoftwareDevice : command.gpu_index;
+  const auto instant_s = instant_of(command, scenario);
+  if (!instant_s) return tl::unexpected(instant_s.error());
+  const double time_s = *instant_s;
   const auto finder = ProbeFinder::create(scenario);
   if (!finder) return tl::unexpected(finder.error());
   const auto points = finder->read("px:" + command.px);
@@ -111,28 +175,27 @@ Result<Explanation> explain(const ExplainOptions& command, scene::ScenarioDesc s
       warn("small targets are drawn with one sample per pixel here (sensor.small_target_px = 0)");
     }
   }
-  Explanation found{scenario.name, scenario.epoch_utc_ns, command.time_s, {pixel.x_px, pixel.y_px}};
+  Explanation found{scenario.name, scenario.epoch_utc_ns, time_s, {pixel.x_px, pixel.y_px}};
   std::optional<ProbePlace> place;
-  if (auto done = explain_frame(scenario, *finder, pixel, command, found, place); !done) {
+  if (auto done = explain_frame(scenario, *finder, pixel, gpu_index, found, place); !done) {
     return tl::unexpected(std::move(done.error()));
   }
   // Read the history of the place on its body, as far back as the surface has one.
-  const double first_s = std::max(command.time_s - 3600.0 * command.hours,
+  const double first_s = std::max(time_s - 3600.0 * command.hours,
                                   1e-9 * static_cast<double>(scenario.thermal.history_start_ns));
-  if (!place || first_s >= command.time_s) return found;
+  if (!place || first_s >= time_s) return found;
   constexpr double kStepS = 600.0;
   constexpr double kMostSteps = 48.0;
-  const auto steps =
-      static_cast<int>(std::min(std::ceil((command.time_s - first_s) / kStepS), kMostSteps));
+  const auto steps = static_cast<int>(std::min(std::ceil((time_s - first_s) / kStepS), kMostSteps));
   std::vector<double> times_s;
   for (int i = 0; i <= steps; ++i) {
-    times_s.push_back(std::lerp(first_s, command.time_s, double{1} * i / steps));
+    times_s.push_back(std::lerp(first_s, time_s, double{1} * i / steps));
   }
   // The history is that of the mean material: what the clutter adds is known for this pixel alone.
   for (scene::Material& material : scenario.materials) material.clutter.reset();
   ProbeRun run(scenario, std::move(times_s),
-               {finder->follow(*place, std::llround(1e9 * command.time_s), pixel.name)});
-  if (auto done = run.run(*finder, command.gpu_index); !done) {
+               {finder->follow(*place, std::llround(1e9 * time_s), pixel.name)});
+  if (auto done = run.run(*finder, gpu_index); !done) {
     return tl::unexpected(std::move(done.error()));
   }
   // The history is seen along the normal. Beside an edge the two pictures differ.
@@ -145,15 +208,16 @@ Result<Explanation> explain(const ExplainOptions& command, scene::ScenarioDesc s
         found.surface->temperature_k, last_k));
   }
   found.history = std::move(run);
+  if (auto added = add_equilibrium(scenario, *finder, found); !added) {
+    return tl::unexpected(std::move(added.error()));
+  }
   return found;
 }
 
 int run(const ExplainOptions& command) {
+  if (command.background) go_into_background();
   const auto scenario = load_scenario_choice(command.input);
   if (!scenario) return fail_config(scenario.error());
-  if (const auto time_ns = sim_time_ns("--time-s", command.time_s); !time_ns) {
-    return fail_call(time_ns.error());
-  }
   const auto found = explain(command, *scenario);
   if (!found) return fail_call(found.error());
   fmt::print(text_stream(command.json), "{}", explain_text(*found));
@@ -172,7 +236,14 @@ int run(const ExplainOptions& command) {
 
 void add_options(CommandLine& line, ExplainOptions& options) {
   add_scenario(line, options.input, "scenario");
-  line.option("--time-s", options.time_s, "Simulation time").type_name("S").required();
+  Option time = line.option("--time-s", options.time_s, "Simulation time").type_name("S");
+  Option run = line.path("--run", options.run,
+                         "Journal of a run of the scenario: its newest image is explained, with "
+                         "the sensor, entities and weather that the host gave it")
+                   .excludes(time);
+  line.option("--frame", options.frame, "Number of another image of that run")
+      .type_name("N")
+      .needs(run);
   line.option("--px", options.px, "Pixel, from 0,0 at the top left").type_name("X,Y").required();
   line.option("--hours", options.hours,
               "Length of the surface's history, at most the scenario's thermal history; 0: none")
@@ -180,6 +251,9 @@ void add_options(CommandLine& line, ExplainOptions& options) {
       .show_default();
   add_json(line, options.json);
   line.output_file("--html", options.html, "Page with the terms and the history");
+  line.flag("--background", options.background,
+            "Let all other programs go first, and leave the graphics processor to them: Mesa's "
+            "software renderer draws, whatever --gpu says");
   add_gpu(line, options.gpu_index);
   line.footer(
       "The terms are emission, what the surface reflects of sky, neighbours (bodies, ground and "
@@ -187,6 +261,8 @@ void add_options(CommandLine& line, ExplainOptions& options) {
       "the sky the path is the sky. They are computed anew from what the pixel shows, and add up "
       "to "
       "the pixel of emit render.\n"
+      "equilibrium is the temperature that the surface would take without memory; it is given for "
+      "scenery of the model foster that is no sheet.\n"
       "Example: emit explain block-on-road --time-s 12600 --px 320,256 --html pixel.html");
 }
 

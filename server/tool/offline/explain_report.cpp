@@ -38,10 +38,10 @@ std::vector<double> values_of(const ProbeRun& history,
   return out;
 }
 
-std::string history_text(const ProbeRun& history) {
+std::string history_text(const Explanation& found) {
+  const ProbeRun& history = *found.history;
   const auto line = [&](std::string_view name, std::string_view unit,
-                        const std::function<double(const ProbeRow&)>& value, bool from_zero) {
-    const std::vector<double> values = values_of(history, value);
+                        const std::vector<double>& values, bool from_zero) {
     double low = std::numeric_limits<double>::infinity();
     double high = -low;
     for (const double v : values) {
@@ -55,12 +55,13 @@ std::string history_text(const ProbeRun& history) {
   };
   const double hours = (history.times_s().back() - history.times_s().front()) / 3600.0;
   return fmt::format("history of the surface, last {:.3g} h\n", hours) +
-         line(
-             "temperature", "K", [](const ProbeRow& row) { return row.temperature_k; }, false) +
-         line(
-             "sun", "W/m2", [](const ProbeRow& row) { return row.sun_w_m2; }, true) +
-         line(
-             "flux inwards", "W/m2", [](const ProbeRow& row) { return row.flux_w_m2; }, false);
+         line("temperature", "K",
+              values_of(history, [](const ProbeRow& row) { return row.temperature_k; }), false) +
+         line("equilibrium", "K", found.equilibrium_k, false) +
+         line("sun", "W/m2", values_of(history, [](const ProbeRow& row) { return row.sun_w_m2; }),
+              true) +
+         line("flux inwards", "W/m2",
+              values_of(history, [](const ProbeRow& row) { return row.flux_w_m2; }), false);
 }
 
 /// Cells of a band's table: name, radiance and share of each term, then sum and pixel.
@@ -149,7 +150,7 @@ std::string explain_text(const Explanation& found) {
     for (std::vector<std::string>& row : term_rows(band)) table.add(std::move(row));
     out += "\n" + table.to_string() + air_sentence(found, band) + "\n";
   }
-  if (found.history) out += "\n" + history_text(*found.history);
+  if (found.history) out += "\n" + history_text(found);
   return out;
 }
 
@@ -168,7 +169,8 @@ Json explain_json(const Explanation& found) {
   if (found.surface) {
     const ExplainedSurface& s = *found.surface;
     Json surface = Json::object();
-    surface.set("object", s.object).set("material", s.material).set("range_m", s.range_m);
+    surface.set("object", s.object).set("is_entity", s.is_entity);
+    surface.set("material", s.material).set("range_m", s.range_m);
     surface.set("position_m", vector(s.position_m)).set("normal", vector(s.normal));
     surface.set("temperature_k", s.temperature_k).set("sky_frac", s.sky_frac);
     surface.set("sun_cosine", s.sun_cosine);
@@ -199,9 +201,11 @@ Json explain_json(const Explanation& found) {
   out.set("bands", bands);
   Json history = Json::array();
   if (found.history) {
-    for (const ProbeRow& row : found.history->rows()) {
+    for (std::size_t i = 0; i < found.history->rows().size(); ++i) {
+      const ProbeRow& row = found.history->rows()[i];
       Json json = Json::object();
       json.set("sim_time_s", row.time_s).set("temperature_k", row.temperature_k);
+      json.set("equilibrium_k", found.equilibrium_k[i]).set("sun_frac", row.sun_frac);
       json.set("sun_w_m2", row.sun_w_m2).set("sky_frac", row.sky_frac);
       json.set("flux_w_m2", row.flux_w_m2);
       history.push(json);
@@ -232,6 +236,15 @@ std::string explain_page(const Explanation& found) {
     std::vector<Plot> plots = found.history->plots();
     // The histories of radiance are those of a view along the normal, so they are left out.
     plots.resize(plots.size() - found.bands.size());
+    PlotSeries equilibrium;
+    equilibrium.label = "equilibrium";
+    equilibrium.line = true;
+    for (std::size_t i = 0; i < found.equilibrium_k.size(); ++i) {
+      if (!std::isfinite(found.equilibrium_k[i])) continue;
+      equilibrium.points.push_back(
+          {found.history->rows()[i].time_s / 3600.0, found.equilibrium_k[i], ""});
+    }
+    if (!equilibrium.points.empty()) plots.front().series.push_back(std::move(equilibrium));
     body += "<h2>History of the surface</h2>\n" + svg_document(plots);
   }
   return html_page(headline(found), kStyle, body);

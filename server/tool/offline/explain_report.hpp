@@ -27,7 +27,9 @@ struct ExplainedBand {
 /// Surface that the pixel shows.
 struct ExplainedSurface {
   std::string object;
+  bool is_entity = false;  ///< the object may move
   std::string material;
+  std::size_t material_index = 0;  ///< in the loaded scene
   glm::dvec3 position_m{0.0};
   glm::dvec3 normal{0.0};
   double range_m = 0.0;
@@ -46,6 +48,7 @@ struct Explanation {
   std::optional<ExplainedSurface> surface = std::nullopt;  ///< empty: sky
   std::vector<ExplainedBand> bands{};
   std::optional<ProbeRun> history = std::nullopt;
+  std::vector<double> equilibrium_k{};  ///< by row of the history (Equilibrium); NaN: not known
 };
 
 /// Terms of a radiance with their names, in the order in which they are shown.

@@ -65,6 +65,9 @@ class ProbeFinder {
   [[nodiscard]] const std::string& material_name(std::size_t index) const {
     return geometry_.materials[index].name;
   }
+  [[nodiscard]] const std::vector<scene::Material>& materials() const noexcept {
+    return geometry_.materials;
+  }
 
  private:
   ProbeFinder(const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,

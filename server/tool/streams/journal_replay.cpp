@@ -54,13 +54,19 @@ class JournalReplay {
     for (const auto step : {&JournalReplay::plan, &JournalReplay::identify}) {
       if (auto done = (this->*step)(); !done) return tl::unexpected(done.error());
     }
+    if (hooks_.on_plan) {
+      if (auto done = hooks_.on_plan(first_run_, last_run_); !done) {
+        return tl::unexpected(done.error());
+      }
+    }
     begin_ns_ = bench_.clock->now_ns();
     Progress progress("replay", options_.passes * planned_frames_);
     progress_ = &progress;
-    while (!ended_ && (options_.passes == 0 || summary_.passes < options_.passes)) {
+    while (!ended_) {
       ++summary_.passes;
+      anew_ = false;
       if (auto played = play(); !played) return tl::unexpected(played.error());
-      ended_ = ended_ || InterruptGuard::interrupted();
+      ended_ = ended_ || InterruptGuard::interrupted() || (!anew_ && !goes_again());
     }
     progress.finish();
     if (truncation_) warn(*truncation_);
@@ -179,10 +185,17 @@ class JournalReplay {
     }
   }
 
+  /// Returns whether another pass follows a whole one.
+  [[nodiscard]] bool goes_again() {
+    if (hooks_.at_end) return hooks_.at_end(next_frame_) == ReplayOrder::anew;
+    return options_.passes == 0 || summary_.passes < options_.passes;
+  }
+
   Result<void> start_daemon(std::int64_t first_time_ns) {
     const std::int64_t start_ns = bench_.clock->now_ns();
     if (auto started = daemon_.start(bench_, first_time_ns); !started) return started;
     summary_.setup_s += seconds(bench_.clock->now_ns() - start_ns);
+    if (hooks_.on_start) hooks_.on_start(*daemon_.player);
     pace_.restart();
     const server::SourceInfo& info = daemon_.source->info();
     if (!summary_.device.empty()) return {};
@@ -205,6 +218,7 @@ class JournalReplay {
     if (!log) return tl::unexpected(log.error());
     std::size_t runs_begun = 0;
     std::uint64_t last_sequence = 0;
+    next_frame_ = 0;
     daemon_.player.reset();
     while (!ended_ && !InterruptGuard::interrupted()) {
       const auto more = log->next();
@@ -230,7 +244,11 @@ class JournalReplay {
         const std::int64_t at_ns = entry.frame().sim_time_ns();
         if (wanted && at_ns > range_.to_ns) break;
         shown = wanted && at_ns >= range_.from_ns;
-        if (shown && !may_show(entry)) break;
+        if (shown) {
+          const ReplayOrder order = order_of_next(entry);
+          if (order == ReplayOrder::end || order == ReplayOrder::anew) break;
+          shown = order == ReplayOrder::show;
+        }
       }
       if (auto applied = apply(entry, shown); !applied) return applied;
     }
@@ -238,14 +256,16 @@ class JournalReplay {
     return {};
   }
 
-  /// Waits until the frame may come. Returns false when the replay ends before it.
-  bool may_show(const v1::JournalEntry& entry) {
-    if (hooks_.go_on && !hooks_.go_on()) {
-      ended_ = true;
-      return false;
-    }
+  /// Waits until the frame may come, and says what becomes of it.
+  ReplayOrder order_of_next(const v1::JournalEntry& entry) {
+    const ReplayOrder order = hooks_.order ? hooks_.order(next_frame_) : ReplayOrder::show;
+    ended_ = ended_ || order == ReplayOrder::end;
+    anew_ = order == ReplayOrder::anew;
+    if (order == ReplayOrder::end || anew_) return order;
+    ++next_frame_;
+    if (order == ReplayOrder::pass) return order;
     pace_.wait_for(entry.wall_time_ns());
-    return !InterruptGuard::interrupted();
+    return InterruptGuard::interrupted() ? ReplayOrder::end : order;
   }
 
   Result<void> apply(const v1::JournalEntry& entry, bool shown) {
@@ -288,7 +308,9 @@ class JournalReplay {
   std::optional<std::string> truncation_;
   Progress* progress_ = nullptr;
   std::int64_t begin_ns_ = 0;
-  bool ended_ = false;  // the caller wants no further frame
+  std::uint64_t next_frame_ = 0;  // of the range, in this pass
+  bool ended_ = false;            // the caller wants no further frame
+  bool anew_ = false;             // the caller wants the range from its begin
 };
 
 }  // namespace

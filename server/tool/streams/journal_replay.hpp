@@ -41,12 +41,27 @@ struct ReplayBench {
   ReplayClock* clock = nullptr;
 };
 
-/// Calls to the caller of a replay. Either may be empty.
+/// Wish of the caller about the next frame of the range.
+enum class ReplayOrder : std::uint8_t {
+  show,  ///< render it and hand it over
+  pass,  ///< render it for the state of the scene, like those before the range
+  anew,  ///< begin the range again, with a surface that is warmed up anew
+  end,   ///< end the replay in order
+};
+
+/// Calls to the caller of a replay. Each may be empty.
 struct ReplayHooks {
+  /// Is called once, when it is known which runs of the log are played, by their place in it.
+  std::function<physics::Result<void>(std::size_t first_run, std::size_t last_run)> on_plan;
+  /// Takes a new player; the one before it is gone.
+  std::function<void(server::JournalPlayer&)> on_start;
   /// Takes a frame of the range, with the number of the pass from 1; an error ends the replay.
   std::function<physics::Result<void>(const server::ReplayedFrame&, std::uint64_t pass)> on_frame;
-  /// Is asked before each frame of the range; false ends the replay in order.
-  std::function<bool()> go_on;
+  /// Is asked before each frame of the range, with its number from 0.
+  std::function<ReplayOrder(std::uint64_t frame)> order;
+  /// Is asked behind the last frame of the range, with the number of frames: `anew` or `end`. Where
+  /// it is empty, JournalReplayOptions::passes decides.
+  std::function<ReplayOrder(std::uint64_t frames)> at_end;
 };
 
 struct JournalReplaySummary {

@@ -184,7 +184,7 @@ TEST_F(JournalReplayTest, every_pace_gives_the_same_frames) {
     EXPECT_EQ(shown_, all) << speed;
   }
   options_.speed = 0.0;
-  hooks_.go_on = [] { return true; };
+  hooks_.order = [](std::uint64_t) { return ReplayOrder::show; };
   replay();
   EXPECT_EQ(shown_, all);
 }
@@ -276,13 +276,44 @@ TEST_F(JournalReplayTest, a_step_renders_no_frame_ahead) {
   const std::vector<Shown> all = whole();
   script_.submitted.clear();
   int left = 3;
-  hooks_.go_on = [&] { return left-- > 0; };
+  hooks_.order = [&](std::uint64_t) { return left-- > 0 ? ReplayOrder::show : ReplayOrder::end; };
   const JournalReplaySummary summary = replay();
   EXPECT_EQ(shown_, std::vector<Shown>(all.begin(), all.begin() + 3));
   EXPECT_EQ(summary.frames, 3U);
   EXPECT_EQ(script_.submitted.size(), 3U);
-  hooks_.go_on = [] { return false; };
+  hooks_.order = [](std::uint64_t) { return ReplayOrder::end; };
   EXPECT_EQ(replay().frames, 0U) << "ended before the first frame";
+}
+
+TEST_F(JournalReplayTest, a_seek_while_it_plays_shows_the_frames_of_the_whole) {
+  entries_.write(file_);
+  const std::vector<Shown> all = whole();
+  first_times_.clear();
+  // Frames 0 to 2, then on to frame 15, back to frame 4 and to the end, and once more from there.
+  std::vector<std::uint64_t> ways{15, 4};
+  std::vector<std::uint64_t> asked;
+  hooks_.order = [&](std::uint64_t frame) {
+    asked.push_back(frame);
+    if (asked.size() > 3 && !ways.empty()) {
+      if (frame < ways.front()) return ReplayOrder::pass;
+      if (frame > ways.front()) return ReplayOrder::anew;
+      ways.erase(ways.begin());
+    }
+    return ReplayOrder::show;
+  };
+  int ends = 0;
+  hooks_.at_end = [&](std::uint64_t frames) {
+    EXPECT_EQ(frames, 18U);
+    return ++ends < 2 ? ReplayOrder::anew : ReplayOrder::end;
+  };
+  const JournalReplaySummary summary = replay();
+  std::vector<Shown> wanted(all.begin(), all.begin() + 3);
+  wanted.push_back(all[15]);
+  wanted.insert(wanted.end(), all.begin() + 4, all.end());
+  wanted.insert(wanted.end(), all.begin(), all.end());
+  EXPECT_EQ(shown_, wanted);
+  EXPECT_EQ(summary.mismatches + summary.mismatches_before, 0U);
+  EXPECT_EQ(first_times_.size(), 3U) << "a seek backwards begins with a surface warmed up anew";
 }
 
 TEST_F(JournalReplayTest, every_pass_gives_the_same_frames) {
@@ -305,7 +336,7 @@ TEST_F(JournalReplayTest, no_number_of_passes_goes_on_until_it_is_ended) {
   entries_.write(file_);
   options_.passes = 0;
   int left = 18 * 4 + 2;
-  hooks_.go_on = [&] { return left-- > 0; };
+  hooks_.order = [&](std::uint64_t) { return left-- > 0 ? ReplayOrder::show : ReplayOrder::end; };
   const JournalReplaySummary summary = replay();
   EXPECT_EQ(summary.frames, 18U * 4U + 2U);
   EXPECT_EQ(summary.passes, 5U);

@@ -5,6 +5,9 @@
 
 namespace emit::renderer {
 
+/// Value of DeviceOptions::gpu_index that takes Mesa's software renderer, whatever else is there.
+inline constexpr int kSoftwareDevice = -2;
+
 /// EGL device as the renderer would use it.
 struct GraphicsDevice {
   std::string name;  ///< GL_RENDERER and GL_VERSION, or why it gives no context

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -13,6 +14,7 @@
 #include "agents/journal_ring.hpp"
 #include "agents/recorder/recorder.hpp"
 #include "emit/protocol/convert.hpp"
+#include "emit/protocol/framing.hpp"
 #include "emit/v1/control.pb.h"
 #include "net/socket.hpp"
 #include "support/daemon_process.hpp"
@@ -207,6 +209,46 @@ class Peer {
   TcpSocket client_;
   protocol::RecordParser parser_{protocol::RecordLimits{}};
 };
+
+TEST(Recorder, GivesTheJournalOfTheRunToWhoeverAsksForIt) {
+  config::JournalConfig config;
+  config.memory_mib = 64;
+  RecorderRig rig(config);
+  JournalTap tap(rig.context.bells.recorder);
+  rig.recorder.set_tap(&tap);
+  rig.start_run();
+  rig.write(3);
+  EXPECT_FALSE(tap.is_ready()) << "nobody has asked";
+  EXPECT_TRUE(tap.ask());
+  EXPECT_FALSE(tap.ask()) << "it is asked already";
+  rig.turn();
+  ASSERT_TRUE(tap.is_ready());
+  protocol::RecordParser parser({});
+  protocol::Record record;
+  v1::ControlRecord message;
+  std::vector<std::uint64_t> sequences;
+  const std::vector<std::byte> records = tap.take();
+  for (std::size_t at = 0; at < records.size();) {
+    const auto space = parser.writable();
+    const std::size_t count = std::min(space.size(), records.size() - at);
+    std::copy_n(records.begin() + static_cast<std::ptrdiff_t>(at), count, space.begin());
+    parser.commit(count);
+    at += count;
+    while (parser.next(record) == protocol::ParseStatus::record) {
+      ASSERT_TRUE(protocol::parse_control_record(record.body, message));
+      sequences.push_back(message.journal().sequence());
+      EXPECT_EQ(message.journal().has_run_start(), sequences.size() == 1);
+    }
+  }
+  EXPECT_EQ(sequences, (std::vector<std::uint64_t>{1, 2, 3, 4}));
+  // Another run begins: what came before is no part of it.
+  rig.start_run();
+  rig.write(1);
+  EXPECT_TRUE(tap.ask());
+  rig.turn();
+  ASSERT_TRUE(tap.is_ready());
+  EXPECT_LT(tap.take().size(), records.size());
+}
 
 TEST(Recorder, MemoryIsBoundedAndALateRecorderIsSentWhatItLacks) {
   config::JournalConfig config;
