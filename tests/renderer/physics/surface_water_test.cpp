@@ -147,9 +147,6 @@ TEST(SurfaceWater, FilmTakesPartBesideTheStomata) {
   asphalt.film_frac = 0.25;
   EXPECT_FALSE(asphalt.dry());
   EXPECT_NEAR(k(asphalt), 0.25 * k(wet), 1e-12);
-  EXPECT_EQ(face_wet_frac(0.7, 1.0), 0.7);
-  EXPECT_EQ(face_wet_frac(0.7, 0.0), 0.0) << "a wall";
-  EXPECT_EQ(face_wet_frac(0.7, -1.0), 0.0) << "an underside";
 }
 
 TEST(Rain, DepthIsThatOfTheGauge) {

@@ -44,13 +44,9 @@ struct StoredWater {
 [[nodiscard]] StoredWater advance_water(const WaterStore& store, double water_mm, double rain_mm,
                                         double open_mm_s, double dt_s) noexcept;
 
-/// Cosine of the tilt from which on a face counts as a wall, which rain does not wet.
+/// Vertical part of a normal up to which a face counts as a wall, on which hardly any rain falls:
+/// nobody need say what rain does to it.
 inline constexpr double kRainTiltCosine = 0.17;
-/// Returns the wetness of a face whose open level ground has `level_frac`; `up` is the vertical
-/// part of its normal. Walls and undersides stay dry.
-[[nodiscard]] constexpr double face_wet_frac(double level_frac, double up) noexcept {
-  return up > kRainTiltCosine ? level_frac : 0.0;
-}
 
 /// Number of grounds of a scene whose water is followed. Further materials share that of the
 /// material whose store is most alike, further twins of clutter that of their mean.
