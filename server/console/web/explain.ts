@@ -143,7 +143,7 @@ export class ExplainPanel {
     if (asked === null || asked.probe !== this.chosen) return;
     const seconds = ((performance.now() - asked.askedAt) / 1000).toFixed(0);
     element("explain-state").textContent =
-      `works out frame ${asked.frame} beside the run, so that no frame waits: ${seconds} s`;
+      `works out frame ${asked.frame} beside the run: ${seconds} s`;
   }
 
   draw(channels: Channel[]): void {
