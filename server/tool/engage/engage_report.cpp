@@ -109,6 +109,10 @@ std::vector<Row> rows_of(const EngageResults& results) {
   rows.push_back({"device", results.device});
   const LoopRecord& record = *results.flight;
   const Figures figures = figures_of(results);
+  // A figure of no values says so.
+  const auto measured = [&](std::string name, const Samples& of, std::string text) {
+    rows.push_back({std::move(name), of.count() > 0 ? std::move(text) : "nothing was measured"});
+  };
   const std::string mode =
       results.real_time ? "real time with a motion simulator" : "lock-step, without wall clock";
   rows.push_back(
@@ -118,34 +122,35 @@ std::vector<Row> rows_of(const EngageResults& results) {
         {"miss distance",
          fmt::format("{:.3f} m at {:.3f} s{}", results.outcome->miss_m, results.outcome->closest_s,
                      results.outcome->on_ground ? " (ended on the ground)" : "")});
-    rows.push_back(
-        {fmt::format("pointing residual of the head beyond {:g} m, RMS / p99 / most", kFarM),
-         fmt::format("{:.2f} / {:.2f} / {:.2f} px", rms_of(figures.residual_px),
-                     percentile_of(figures.residual_px, 0.99),
-                     percentile_of(figures.residual_px, 1.0))});
-    rows.push_back({fmt::format("measured line of sight beyond {:g} m, error, median / p99", kFarM),
-                    fmt::format("{:.3f} / {:.2f} px", percentile_of(figures.measured_px, 0.5),
-                                percentile_of(figures.measured_px, 0.99))});
-    rows.push_back({"greatest lateral acceleration",
-                    fmt::format("{:.1f} m/s2", percentile_of(figures.lift_m_s2, 1.0))});
+    measured(fmt::format("pointing residual of the head beyond {:g} m, RMS / p99 / most", kFarM),
+             figures.residual_px,
+             fmt::format("{:.2f} / {:.2f} / {:.2f} px", rms_of(figures.residual_px),
+                         percentile_of(figures.residual_px, 0.99),
+                         percentile_of(figures.residual_px, 1.0)));
+    measured(fmt::format("measured line of sight beyond {:g} m, error, median / p99", kFarM),
+             figures.measured_px,
+             fmt::format("{:.3f} / {:.2f} px", percentile_of(figures.measured_px, 0.5),
+                         percentile_of(figures.measured_px, 0.99)));
+    measured("greatest lateral acceleration", figures.lift_m_s2,
+             fmt::format("{:.1f} m/s2", percentile_of(figures.lift_m_s2, 1.0)));
   }
   rows.push_back({"frames with the target found",
                   fmt::format("{} of {}", figures.found, record.frames.size())});
   rows.push_back({"frames flagged degraded", fmt::format("{}", figures.degraded)});
   if (results.real_time) {
-    rows.push_back({"pointing error of the motion simulator, RMS / p99 / most",
-                    fmt::format("{:.3f} / {:.3f} / {:.3f} px", rms_of(figures.pointing_px),
-                                percentile_of(figures.pointing_px, 0.99),
-                                percentile_of(figures.pointing_px, 1.0))});
+    measured("pointing error of the motion simulator, RMS / p99 / most", figures.pointing_px,
+             fmt::format("{:.3f} / {:.3f} / {:.3f} px", rms_of(figures.pointing_px),
+                         percentile_of(figures.pointing_px, 0.99),
+                         percentile_of(figures.pointing_px, 1.0)));
   } else {
     rows.push_back(
         {"greatest difference of pose and frame",
          fmt::format("{:.2g} m, {:.2g} rad", figures.pose_error_m, figures.pose_error_rad)});
   }
-  rows.push_back(
-      {"loop delay, pose to answer, median / p99 / most",
-       fmt::format("{:.1f} / {:.1f} / {:.1f} ms", percentile_of(figures.delay_ms, 0.5),
-                   percentile_of(figures.delay_ms, 0.99), percentile_of(figures.delay_ms, 1.0))});
+  measured("loop delay, pose to answer, median / p99 / most", figures.delay_ms,
+           fmt::format("{:.1f} / {:.1f} / {:.1f} ms", percentile_of(figures.delay_ms, 0.5),
+                       percentile_of(figures.delay_ms, 0.99),
+                       percentile_of(figures.delay_ms, 1.0)));
   rows.push_back({"frames a second of wall time",
                   fmt::format("{:.1f}", static_cast<double>(record.frames.size()) /
                                             std::max(record.wall_s, 1e-9))});
