@@ -66,7 +66,7 @@ std::vector<std::uint32_t> materials_of_sheets(const SceneGeometry& geometry) {
     }
   }
   std::ranges::sort(found);
-  found.erase(std::ranges::unique(found).begin(), found.end());
+  found.erase(std::unique(found.begin(), found.end()), found.end());
   return found;
 }
 
