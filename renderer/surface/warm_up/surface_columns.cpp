@@ -260,7 +260,7 @@ class InstanceColumns {
       i = end;
     }
     std::ranges::sort(seams_);
-    seams_.erase(std::ranges::unique(seams_).begin(), seams_.end());
+    seams_.erase(std::unique(seams_.begin(), seams_.end()), seams_.end());
   }
   /// Notes an edge between two leaves.
   void join(const Side& one, const Side& other) {
