@@ -15,6 +15,7 @@ namespace emit::renderer {
 namespace {
 
 constexpr float kEvenDiscPx = 0.6F;
+constexpr float kFineDiscPx = 4.0F;
 constexpr float kStraightDiscPx = 16.0F;
 
 /// Middle and radius of a disc in the image; the radius is 0 out of view.
@@ -55,14 +56,19 @@ float half_plane_frac(float distance, glm::vec2 normal) noexcept {
   return distance < 0.0F ? 1.0F - covered : covered;
 }
 
+std::size_t disc_side(float radius) noexcept {
+  return radius < kFineDiscPx ? 8 : 2;
+}
+
 glm::vec3 disc_point(std::size_t i, glm::vec2 centre, float radius) noexcept {
+  const std::size_t side = disc_side(radius);
   if (radius < kEvenDiscPx) {
-    const float share = (static_cast<float>(i) + 0.5F) / static_cast<float>(SkyBodies::kPoints);
+    const float share = (static_cast<float>(i) + 0.5F) / static_cast<float>(side * side);
     const float angle = 2.39996323F * static_cast<float>(i);
     return {std::sqrt(share) * glm::vec2(std::cos(angle), std::sin(angle)), 1.0F};
   }
-  const glm::vec2 place(static_cast<float>(i & 3U), static_cast<float>(i >> 2U));
-  const glm::vec2 point = ((place + 0.5F) * 0.25F - 0.5F - centre) / radius;
+  const glm::vec2 place(static_cast<float>(i % side), static_cast<float>(i / side));
+  const glm::vec2 point = ((place + 0.5F) / static_cast<float>(side) - 0.5F - centre) / radius;
   const float away = glm::length(point);
   return away < 1.0F ? glm::vec3(point, 1.0F) : glm::vec3(point * (0.99F / away), 1e-6F);
 }
@@ -75,8 +81,8 @@ void set_sky_bodies(const physics::SunPosition& sun, const physics::MoonPosition
       image_disc(sun.direction_enu, physics::kSunSemiAngleRad / sun.distance_au, params);
   params.sun_at_px = sun_disc.at_px;
   params.sun_radius_px = sun_disc.radius_px;
-  const ImageDisc moon_disc = image_disc(
-      moon.direction_enu, std::asin(physics::kMoonRadiusM / moon.distance_m), params);
+  const ImageDisc moon_disc =
+      image_disc(moon.direction_enu, std::asin(physics::kMoonRadiusM / moon.distance_m), params);
   params.moon_at_px = moon_disc.at_px;
   params.moon_radius_px = moon_disc.radius_px;
   params.moon_sun_au = static_cast<float>(moon.sun_au);
@@ -102,9 +108,9 @@ float disc_cover_frac(glm::vec2 centre_px, float radius_px) noexcept {
   for (int i = 0; i < 16; ++i) {
     const float angle = std::lerp(first, last, (static_cast<float>(i) + 0.5F) / 16.0F);
     const float half_chord = radius_px * std::cos(angle);
-    sum += std::max(std::min(0.5F, centre_px.y + half_chord) -
-                        std::max(-0.5F, centre_px.y - half_chord),
-                    0.0F) *
+    sum += std::max(
+               std::min(0.5F, centre_px.y + half_chord) - std::max(-0.5F, centre_px.y - half_chord),
+               0.0F) *
            half_chord;
   }
   return std::clamp(sum * (last - first) / 16.0F, 0.0F, 1.0F);
@@ -116,19 +122,21 @@ SkyBodies sky_bodies_at(glm::ivec2 px, const gpu::FrameParams& params) noexcept 
   if (params.moon_radius_px > 0.0F) {
     const glm::vec2 centre = params.moon_at_px - middle;
     out.moon_frac = disc_cover_frac(centre, params.moon_radius_px);
-    for (std::size_t i = 0; i < SkyBodies::kPoints; ++i) {
+    const std::size_t side = disc_side(params.moon_radius_px);
+    out.moon_points = side * side;
+    for (std::size_t i = 0; i < out.moon_points; ++i) {
       const glm::vec3 sample = disc_point(i, centre, params.moon_radius_px);
       const glm::vec2 point(sample);
       const glm::vec3 normal(point, std::sqrt(std::max(1.0F - glm::dot(point, point), 0.0F)));
       out.moon_weight[i] = sample.z;
       out.moon_cosine[i] = std::max(glm::dot(normal, params.moon_to_sun), 0.0F);
-      out.moon_k[i] = static_cast<float>(
-          physics::moon_temperature_k(out.moon_cosine[i], params.moon_sun_au));
+      out.moon_k[i] =
+          static_cast<float>(physics::moon_temperature_k(out.moon_cosine[i], params.moon_sun_au));
     }
   }
   if (params.sun_radius_px > 0.0F) {
-    out.sun_frac = disc_cover_frac(params.sun_at_px - middle, params.sun_radius_px) *
-                   (1.0F - out.moon_frac);
+    out.sun_frac =
+        disc_cover_frac(params.sun_at_px - middle, params.sun_radius_px) * (1.0F - out.moon_frac);
   }
   return out;
 }

@@ -22,12 +22,13 @@ void set_sky_bodies(const physics::SunPosition& sun, const physics::MoonPosition
 
 /// Sun and moon in a pixel of the sky.
 struct SkyBodies {
-  static constexpr std::size_t kPoints = 16;  ///< EMIT_DISC_POINTS of lib/sky_disc.glsl
-  float sun_frac = 0.0F;                      ///< share of the pixel
+  static constexpr std::size_t kMostPoints = 64;
+  float sun_frac = 0.0F;  ///< share of the pixel
   float moon_frac = 0.0F;
-  std::array<float, kPoints> moon_k{};        ///< temperature of points of the moon
-  std::array<float, kPoints> moon_cosine{};   ///< of the sun's incidence there
-  std::array<float, kPoints> moon_weight{};   ///< of the points, not normalised
+  std::size_t moon_points = 0;                   ///< entries of the arrays in use
+  std::array<float, kMostPoints> moon_k{};       ///< temperature of points of the moon
+  std::array<float, kMostPoints> moon_cosine{};  ///< of the sun's incidence there
+  std::array<float, kMostPoints> moon_weight{};  ///< of the points, not normalised
 };
 /// Twin of what radiance.comp does with the discs, for a pixel of the rendered image.
 [[nodiscard]] SkyBodies sky_bodies_at(glm::ivec2 px, const gpu::FrameParams& params) noexcept;

@@ -477,7 +477,7 @@ RadianceTerms BandModel::terms(std::size_t band, const Seen& seen,
     if (seen.bodies.moon_frac > 0.0F) {
       double sum = 0.0;
       double weights = 0.0;
-      for (std::size_t p = 0; p < SkyBodies::kPoints; ++p) {
+      for (std::size_t p = 0; p < seen.bodies.moon_points; ++p) {
         sum += seen.bodies.moon_weight[p] *
                (physics::kMoonEmissivityFrac * black_w_m2_sr(band, seen.bodies.moon_k[p]) +
                 seen.bodies.moon_cosine[p] * params.moon_reflected_w_m2_sr);

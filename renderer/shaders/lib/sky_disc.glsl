@@ -3,8 +3,8 @@
 #ifndef EMIT_SKY_DISC_GLSL
 #define EMIT_SKY_DISC_GLSL
 
-#define EMIT_DISC_POINTS 16
 const float kEvenDiscPx = 0.6;       // smaller discs are averaged over all of their face
+const float kFineDiscPx = 4.0;       // larger ones vary little within a pixel
 const float kStraightDiscPx = 16.0;  // edges of larger discs are straight within a pixel
 
 // Share of the unit square around the origin that lies on the near side of a straight edge, 0..1. `distance` goes from
@@ -35,16 +35,20 @@ float disc_cover_frac(vec2 centre, float radius) {
   return clamp(sum * (last - first) / 16.0, 0.0, 1.0);
 }
 
-// Point `i` of EMIT_DISC_POINTS at which a pixel shows the face of a disc: place in radii from its centre, and weight.
+// Points along a side of the grid at which a pixel shows the face of a disc. It has the square of them.
+int disc_side(float radius) { return radius < kFineDiscPx ? 8 : 2; }
+
+// Point `i` of these: place in radii from the disc's centre, and weight.
 vec3 disc_point(int i, vec2 centre, float radius) {
+  int side = disc_side(radius);
   if (radius < kEvenDiscPx) {
     // Equal areas, golden-section angles.
-    float share = (float(i) + 0.5) / float(EMIT_DISC_POINTS);
+    float share = (float(i) + 0.5) / float(side * side);
     float angle = 2.39996323 * float(i);
     return vec3(sqrt(share) * vec2(cos(angle), sin(angle)), 1.0);
   }
   // A grid in the pixel. Points beside the disc count only where there are no others.
-  vec2 point = ((vec2(i & 3, i >> 2) + 0.5) * 0.25 - 0.5 - centre) / radius;
+  vec2 point = ((vec2(i % side, i / side) + 0.5) / float(side) - 0.5 - centre) / radius;
   float away = length(point);
   return away < 1.0 ? vec3(point, 1.0) : vec3(point * (0.99 / away), 1e-6);
 }
