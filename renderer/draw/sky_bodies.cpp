@@ -14,8 +14,8 @@
 namespace emit::renderer {
 namespace {
 
-constexpr float kEvenDiscPx = 0.6F;
-constexpr float kFineDiscPx = 4.0F;
+constexpr float kEvenDiscPx = 2.0F;
+constexpr float kDiscPoints = 32.0F;
 constexpr float kStraightDiscPx = 16.0F;
 
 /// Middle and radius of a disc in the image; the radius is 0 out of view.
@@ -56,12 +56,11 @@ float half_plane_frac(float distance, glm::vec2 normal) noexcept {
   return distance < 0.0F ? 1.0F - covered : covered;
 }
 
-std::size_t disc_side(float radius) noexcept {
-  return radius < kFineDiscPx ? 8 : 2;
+int disc_side(float radius) noexcept {
+  return radius < kEvenDiscPx ? 16 : std::clamp(static_cast<int>(kDiscPoints / radius), 2, 16);
 }
 
-glm::vec3 disc_point(std::size_t i, glm::vec2 centre, float radius) noexcept {
-  const std::size_t side = disc_side(radius);
+glm::vec3 disc_point(int i, int side, glm::vec2 centre, float radius) noexcept {
   if (radius < kEvenDiscPx) {
     const float share = (static_cast<float>(i) + 0.5F) / static_cast<float>(side * side);
     const float angle = 2.39996323F * static_cast<float>(i);
@@ -122,10 +121,10 @@ SkyBodies sky_bodies_at(glm::ivec2 px, const gpu::FrameParams& params) noexcept 
   if (params.moon_radius_px > 0.0F) {
     const glm::vec2 centre = params.moon_at_px - middle;
     out.moon_frac = disc_cover_frac(centre, params.moon_radius_px);
-    const std::size_t side = disc_side(params.moon_radius_px);
-    out.moon_points = side * side;
+    const int side = disc_side(params.moon_radius_px);
+    out.moon_points = static_cast<std::size_t>(side * side);
     for (std::size_t i = 0; i < out.moon_points; ++i) {
-      const glm::vec3 sample = disc_point(i, centre, params.moon_radius_px);
+      const glm::vec3 sample = disc_point(static_cast<int>(i), side, centre, params.moon_radius_px);
       const glm::vec2 point(sample);
       const glm::vec3 normal(point, std::sqrt(std::max(1.0F - glm::dot(point, point), 0.0F)));
       out.moon_weight[i] = sample.z;

@@ -22,7 +22,7 @@ void set_sky_bodies(const physics::SunPosition& sun, const physics::MoonPosition
 
 /// Sun and moon in a pixel of the sky.
 struct SkyBodies {
-  static constexpr std::size_t kMostPoints = 64;
+  static constexpr std::size_t kMostPoints = 256;
   float sun_frac = 0.0F;  ///< share of the pixel
   float moon_frac = 0.0F;
   std::size_t moon_points = 0;                   ///< entries of the arrays in use

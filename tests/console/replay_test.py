@@ -25,7 +25,7 @@ SCENARIO = "box"
 SIZE = ("sensor.width_px=96", "sensor.height_px=64")
 FRAMES = 24
 STEP_NS = 40_000_000
-PATIENCE_S = 240.0
+PATIENCE_S = 120.0
 SHOWN = "Number(document.querySelector('#frame-number').textContent)"
 STATE = "emitConsole.replay.state"
 
@@ -111,7 +111,7 @@ class Replay(unittest.TestCase):
             def mouse(kind, at, **more):
                 self.page.call("Input.dispatchMouseEvent", type=kind, x=at, y=y, button="left", **more)
 
-            mouse("mousePressed", x - 60, buttons=1, clickCount=1)
+            mouse("mousePressed", self.place_of(17)[0], buttons=1, clickCount=1)
             mouse("mouseMoved", x, buttons=1)
             self.assertEqual(self.page.evaluate(SHOWN), 2)
             mouse("mouseReleased", x, clickCount=1)

@@ -3,8 +3,8 @@
 #ifndef EMIT_SKY_DISC_GLSL
 #define EMIT_SKY_DISC_GLSL
 
-const float kEvenDiscPx = 0.6;       // smaller discs are averaged over all of their face
-const float kFineDiscPx = 4.0;       // larger ones vary little within a pixel
+const float kEvenDiscPx = 2.0;       // smaller discs are evenly bright: the mean of their face
+const float kDiscPoints = 32.0;      // points of a grid along the radius of larger ones
 const float kStraightDiscPx = 16.0;  // edges of larger discs are straight within a pixel
 
 // Share of the unit square around the origin that lies on the near side of a straight edge, 0..1. `distance` goes from
@@ -35,12 +35,11 @@ float disc_cover_frac(vec2 centre, float radius) {
   return clamp(sum * (last - first) / 16.0, 0.0, 1.0);
 }
 
-// Points along a side of the grid at which a pixel shows the face of a disc. It has the square of them.
-int disc_side(float radius) { return radius < kFineDiscPx ? 8 : 2; }
+// Points along a side of the square in which a pixel shows the face of a disc; their number is the square of it.
+int disc_side(float radius) { return radius < kEvenDiscPx ? 16 : clamp(int(kDiscPoints / radius), 2, 16); }
 
 // Point `i` of these: place in radii from the disc's centre, and weight.
-vec3 disc_point(int i, vec2 centre, float radius) {
-  int side = disc_side(radius);
+vec3 disc_point(int i, int side, vec2 centre, float radius) {
   if (radius < kEvenDiscPx) {
     // Equal areas, golden-section angles.
     float share = (float(i) + 0.5) / float(side * side);

@@ -237,7 +237,7 @@ float moon_disc_w_m2_sr(uint band, vec4 sight, vec2 centre, float cover_frac) {
   bool below_table = false;  // by night the moon is darker than the table; it is the table's first node there
   int side = disc_side(frame.moon_radius_px);
   for (int i = 0; i < side * side; ++i) {
-    vec3 point = disc_point(i, centre, frame.moon_radius_px);
+    vec3 point = disc_point(i, side, centre, frame.moon_radius_px);
     vec3 normal = vec3(point.xy, sqrt(max(1.0 - dot(point.xy, point.xy), 0.0)));
     float cosine = max(dot(normal, frame.moon_to_sun), 0.0);
     float temperature_k = max(EMIT_MOON_SUBSOLAR_K * inversesqrt(frame.moon_sun_au) * sqrt(sqrt(cosine)), 100.0);
