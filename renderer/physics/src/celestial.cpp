@@ -71,8 +71,8 @@ EarthAttitude earth_attitude(const JulianDate& ut1, double tt_minus_ut1_s) noexc
   const double sidereal_deg =
       280.46061837 + 360.0 * (ut1_days - whole) + 0.98564736629 * ut1_days +
       ut1_centuries * ut1_centuries * (0.000387933 - ut1_centuries / 38710000.0);
-  earth.sidereal_rad = wrapped_turn(sidereal_deg * kDegree +
-                                    nut.longitude_rad * std::cos(earth.obliquity_rad));
+  earth.sidereal_rad =
+      wrapped_turn(sidereal_deg * kDegree + nut.longitude_rad * std::cos(earth.obliquity_rad));
   return earth;
 }
 

@@ -24,7 +24,7 @@ struct JulianDate {
 
 /// Turn of the earth at an instant, equinox of date.
 struct EarthAttitude {
-  double centuries = 0.0;  ///< of terrestrial time since J2000
+  double centuries = 0.0;     ///< of terrestrial time since J2000
   double nutation_rad = 0.0;  ///< in longitude
   double obliquity_rad = 0.0;
   double sidereal_rad = 0.0;  ///< Greenwich apparent sidereal time

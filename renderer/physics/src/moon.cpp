@@ -25,7 +25,8 @@ struct LatitudeTerm {
   double latitude;
 };
 
-// Leading terms of ELP-2000/82 (Chapront). What is left out adds up to some thousandths of a degree.
+// Leading terms of ELP-2000/82 (Chapront). What is left out adds up to some thousandths of a
+// degree.
 constexpr LongitudeTerm kLongitude[] = {
     {0, 0, 1, 0, 6288774, -20905355}, {2, 0, -1, 0, 1274027, -3699111},
     {2, 0, 0, 0, 658314, -2955968},   {0, 0, 2, 0, 213618, -569925},
@@ -45,13 +46,13 @@ constexpr LongitudeTerm kLongitude[] = {
     {1, 0, 1, 0, -2348, 6322},        {2, -2, 0, 0, 2236, -9884},
     {0, 1, 2, 0, -2120, 5751}};
 constexpr LatitudeTerm kLatitude[] = {
-    {0, 0, 0, 1, 5128122},  {0, 0, 1, 1, 280602},   {0, 0, 1, -1, 277693}, {2, 0, 0, -1, 173237},
-    {2, 0, -1, 1, 55413},   {2, 0, -1, -1, 46271},  {2, 0, 0, 1, 32573},   {0, 0, 2, 1, 17198},
-    {2, 0, 1, -1, 9266},    {0, 0, 2, -1, 8822},    {2, -1, 0, -1, 8216},  {2, 0, -2, -1, 4324},
-    {2, 0, 1, 1, 4200},     {2, 1, 0, -1, -3359},   {2, -1, -1, 1, 2463},  {2, -1, 0, 1, 2211},
-    {2, -1, -1, -1, 2065},  {0, 1, -1, -1, -1870},  {4, 0, -1, -1, 1828},  {0, 1, 0, 1, -1794},
-    {0, 0, 0, 3, -1749},    {0, 1, -1, 1, -1565},   {1, 0, 0, 1, -1491},   {0, 1, 1, 1, -1475},
-    {0, 1, 1, -1, -1410},   {0, 1, 0, -1, -1344},   {1, 0, 0, -1, -1335}};
+    {0, 0, 0, 1, 5128122}, {0, 0, 1, 1, 280602},  {0, 0, 1, -1, 277693}, {2, 0, 0, -1, 173237},
+    {2, 0, -1, 1, 55413},  {2, 0, -1, -1, 46271}, {2, 0, 0, 1, 32573},   {0, 0, 2, 1, 17198},
+    {2, 0, 1, -1, 9266},   {0, 0, 2, -1, 8822},   {2, -1, 0, -1, 8216},  {2, 0, -2, -1, 4324},
+    {2, 0, 1, 1, 4200},    {2, 1, 0, -1, -3359},  {2, -1, -1, 1, 2463},  {2, -1, 0, 1, 2211},
+    {2, -1, -1, -1, 2065}, {0, 1, -1, -1, -1870}, {4, 0, -1, -1, 1828},  {0, 1, 0, 1, -1794},
+    {0, 0, 0, 3, -1749},   {0, 1, -1, 1, -1565},  {1, 0, 0, 1, -1491},   {0, 1, 1, 1, -1475},
+    {0, 1, 1, -1, -1410},  {0, 1, 0, -1, -1344},  {1, 0, 0, -1, -1335}};
 
 }  // namespace
 
@@ -72,7 +73,8 @@ MoonEcliptic moon_ecliptic(double tt_centuries) noexcept {
     const int size = std::abs(multiple);
     return size == 2 ? eccentricity * eccentricity : size == 1 ? eccentricity : 1.0;
   };
-  double longitude = 3958.0 * std::sin(venus) + 1962.0 * std::sin(mean - f) + 318.0 * std::sin(jupiter);
+  double longitude =
+      3958.0 * std::sin(venus) + 1962.0 * std::sin(mean - f) + 318.0 * std::sin(jupiter);
   double latitude = -2235.0 * std::sin(mean) + 382.0 * std::sin(third) +
                     175.0 * std::sin(venus - f) + 175.0 * std::sin(venus + f) +
                     127.0 * std::sin(mean - n) - 115.0 * std::sin(mean + n);
@@ -83,8 +85,8 @@ MoonEcliptic moon_ecliptic(double tt_centuries) noexcept {
     distance_m += scale(term.m) * term.distance * std::cos(angle);
   }
   for (const LatitudeTerm& term : kLatitude) {
-    latitude += scale(term.m) * term.latitude *
-                std::sin(term.d * d + term.m * m + term.n * n + term.f * f);
+    latitude +=
+        scale(term.m) * term.latitude * std::sin(term.d * d + term.m * m + term.n * n + term.f * f);
   }
   return {wrapped_turn(mean + longitude * 1e-6 * kDegree), latitude * 1e-6 * kDegree, distance_m};
 }
@@ -95,9 +97,9 @@ MoonPosition moon_position(std::int64_t posix_utc_ns, const GeoPlace& place) noe
   const MoonEcliptic moon = moon_ecliptic(earth.centuries);
   const SunEcliptic sun = sun_ecliptic(earth);
   const glm::dvec3 moon_m =
-      moon.distance_m * ecef_from_ecliptic(earth, ecliptic_direction(
-                                                      moon.longitude_rad + earth.nutation_rad,
-                                                      moon.latitude_rad));
+      moon.distance_m *
+      ecef_from_ecliptic(
+          earth, ecliptic_direction(moon.longitude_rad + earth.nutation_rad, moon.latitude_rad));
   const glm::dvec3 sun_m =
       sun.distance_au * kAstronomicalUnitM *
       ecef_from_ecliptic(earth, ecliptic_direction(sun.longitude_rad, sun.latitude_rad));

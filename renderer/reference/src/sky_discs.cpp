@@ -18,9 +18,9 @@ double SkyDiscs::radiance_w_m2_sr(const BandRadiance& band, const SolveView& vie
   const glm::dmat3 world_from_sensor = glm::mat3_cast(view.sensor_pose.world_from_body) *
                                        glm::transpose(physics::sensor_from_body());
   const auto ray = [&](double x, double y) {
-    return world_from_sensor * glm::normalize(glm::dvec3((x - 0.5 * view.width_px) / focal_px,
-                                                         (y - 0.5 * view.height_px) / focal_px,
-                                                         1.0));
+    return world_from_sensor *
+           glm::normalize(glm::dvec3((x - 0.5 * view.width_px) / focal_px,
+                                     (y - 0.5 * view.height_px) / focal_px, 1.0));
   };
   const auto column = static_cast<double>(pixel % view.width_px);
   const auto row = static_cast<double>(pixel / view.width_px);
@@ -46,9 +46,9 @@ double SkyDiscs::radiance_w_m2_sr(const BandRadiance& band, const SolveView& vie
     const double miss_m2 = moon.distance_m * moon.distance_m - along_m * along_m;
     const double deep_m2 = physics::kMoonRadiusM * physics::kMoonRadiusM - miss_m2;
     if (near_moon && along_m > 0.0 && deep_m2 > 0.0) {
-      const glm::dvec3 normal = ((along_m - std::sqrt(deep_m2)) * d -
-                                 moon.distance_m * moon.direction_enu) /
-                                physics::kMoonRadiusM;
+      const glm::dvec3 normal =
+          ((along_m - std::sqrt(deep_m2)) * d - moon.distance_m * moon.direction_enu) /
+          physics::kMoonRadiusM;
       const double cosine = std::max(glm::dot(normal, moon.to_sun_enu), 0.0);
       const double kelvin =
           std::max(physics::kMoonSubsolarK * std::sqrt(std::sqrt(cosine) / moon.sun_au), 100.0);

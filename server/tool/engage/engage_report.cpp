@@ -147,10 +147,10 @@ std::vector<Row> rows_of(const EngageResults& results) {
         {"greatest difference of pose and frame",
          fmt::format("{:.2g} m, {:.2g} rad", figures.pose_error_m, figures.pose_error_rad)});
   }
-  measured("loop delay, pose to answer, median / p99 / most", figures.delay_ms,
-           fmt::format("{:.1f} / {:.1f} / {:.1f} ms", percentile_of(figures.delay_ms, 0.5),
-                       percentile_of(figures.delay_ms, 0.99),
-                       percentile_of(figures.delay_ms, 1.0)));
+  measured(
+      "loop delay, pose to answer, median / p99 / most", figures.delay_ms,
+      fmt::format("{:.1f} / {:.1f} / {:.1f} ms", percentile_of(figures.delay_ms, 0.5),
+                  percentile_of(figures.delay_ms, 0.99), percentile_of(figures.delay_ms, 1.0)));
   rows.push_back({"frames a second of wall time",
                   fmt::format("{:.1f}", static_cast<double>(record.frames.size()) /
                                             std::max(record.wall_s, 1e-9))});

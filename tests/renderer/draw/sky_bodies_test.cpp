@@ -44,7 +44,8 @@ TEST(SkyDisc, shares_of_single_pixels_are_those_of_points_in_them) {
   for (const float radius : {0.3F, 0.8F, 4.0F, 30.0F, 300.0F}) {
     for (int i = 0; i < 40; ++i) {
       const float angle = 6.2831853F * static_cast<float>(i) / 40.0F;
-      const glm::vec2 centre = (radius + offset(random)) * glm::vec2(std::cos(angle), std::sin(angle));
+      const glm::vec2 centre =
+          (radius + offset(random)) * glm::vec2(std::cos(angle), std::sin(angle));
       constexpr int kSide = 200;
       int inside = 0;
       for (int p = 0; p < kSide * kSide; ++p) {
@@ -66,8 +67,8 @@ gpu::FrameParams camera(double fov_h_rad, double heading_rad, double pitch_rad) 
   sensor.height_px = 512;
   gpu::FrameParams params{};
   params.rendered_px = {640, 512};
-  const physics::Pose pose{{0.0, 0.0, 100.0},
-                           physics::world_from_body_heading_pitch_roll(heading_rad, pitch_rad, 0.3)};
+  const physics::Pose pose{
+      {0.0, 0.0, 100.0}, physics::world_from_body_heading_pitch_roll(heading_rad, pitch_rad, 0.3)};
   static_cast<void>(set_camera(sensor, fov_h_rad, pose, params));
   return params;
 }
@@ -87,13 +88,15 @@ TEST(SkyDisc, has_the_solid_angle_of_the_body_anywhere_in_the_image) {
   moon.direction_enu = {0.0, 0.0, -1.0};
   for (const double fov_rad : {0.02, 0.3, 1.8}) {
     for (const double off : {0.0, 0.2, 0.42}) {
-      const gpu::FrameParams params = camera(fov_rad, 1.0 + off * fov_rad, 0.5 - 0.3 * off * fov_rad);
+      const gpu::FrameParams params =
+          camera(fov_rad, 1.0 + off * fov_rad, 0.5 - 0.3 * off * fov_rad);
       ASSERT_GT(params.rendered_px.x, 0U);
       gpu::FrameParams set = params;
       set_sky_bodies(sun, moon, set);
       ASSERT_GT(set.sun_radius_px, 0.0F);
       EXPECT_EQ(set.moon_radius_px, 0.0F);
-      // Sum the shares over the solid angles of the pixels; a small disc may end at the image's edge.
+      // Sum the shares over the solid angles of the pixels; a small disc may end at the image's
+      // edge.
       double sum_sr = 0.0;
       bool cut = false;
       const int reach = static_cast<int>(set.sun_radius_px) + 2;
@@ -101,8 +104,8 @@ TEST(SkyDisc, has_the_solid_angle_of_the_body_anywhere_in_the_image) {
       for (int y = middle.y - reach; y <= middle.y + reach; ++y) {
         for (int x = middle.x - reach; x <= middle.x + reach; ++x) {
           cut = cut || x < 0 || y < 0 || x >= 640 || y >= 512;
-          const glm::dvec2 tangent = (glm::dvec2(x, y) + 0.5) * glm::dvec2(set.ray_per_px) +
-                                     glm::dvec2(set.ray_at_corner);
+          const glm::dvec2 tangent =
+              (glm::dvec2(x, y) + 0.5) * glm::dvec2(set.ray_per_px) + glm::dvec2(set.ray_at_corner);
           sum_sr += sky_bodies_at({x, y}, set).sun_frac * set.ray_per_px.x * set.ray_per_px.y *
                     std::pow(1.0 + glm::dot(tangent, tangent), -1.5);
         }
@@ -117,8 +120,8 @@ TEST(SkyDisc, is_skipped_out_of_view_behind_the_camera_and_below_the_horizon) {
   moon.direction_enu = towards(1.0, 0.5);
   physics::SunPosition sun;
   for (const auto& [heading, elevation, seen] :
-       {std::tuple{1.0, 0.5, true}, std::tuple{1.3, 0.5, false}, std::tuple{1.0 + 3.14159, 0.5, false},
-        std::tuple{1.0 + 3.14159, -0.5, false}}) {
+       {std::tuple{1.0, 0.5, true}, std::tuple{1.3, 0.5, false},
+        std::tuple{1.0 + 3.14159, 0.5, false}, std::tuple{1.0 + 3.14159, -0.5, false}}) {
     gpu::FrameParams params = camera(0.2, heading, elevation);
     sun.direction_enu = towards(1.0, 0.5);
     set_sky_bodies(sun, moon, params);

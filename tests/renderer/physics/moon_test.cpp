@@ -41,8 +41,8 @@ TEST(MoonPosition, covers_the_sun_where_and_when_eclipses_were_greatest) {
   };
   // NASA catalogue of solar eclipses: instant (UT) and place of the greatest eclipse, all of them
   // total.
-  for (const Eclipse& e : {Eclipse{934369408, 45.1, 24.3},     // 1999-08-11 11:03:28
-                           Eclipse{1503339932, 36.97, -87.67},  // 2017-08-21 18:25:32
+  for (const Eclipse& e : {Eclipse{934369408, 45.1, 24.3},          // 1999-08-11 11:03:28
+                           Eclipse{1503339932, 36.97, -87.67},      // 2017-08-21 18:25:32
                            Eclipse{1712600238, 25.29, -104.14}}) {  // 2024-04-08 18:17:18
     const GeoPlace place = place_deg(e.lat_deg, e.lon_deg);
     const SunPosition sun = sun_position(e.posix_s * kNsPerS, place);

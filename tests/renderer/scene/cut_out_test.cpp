@@ -88,8 +88,8 @@ struct Opacity {
     double sum = 0.0;
     for (int dy = 0; dy < 2; ++dy) {
       for (int dx = 0; dx < 2; ++dx) {
-        const double share = (dx == 1 ? x - left : 1.0 - (x - left)) *
-                             (dy == 1 ? y - top : 1.0 - (y - top));
+        const double share =
+            (dx == 1 ? x - left : 1.0 - (x - left)) * (dy == 1 ? y - top : 1.0 - (y - top));
         const auto at = static_cast<std::size_t>(index(top + dy, height_px) * width_px +
                                                  index(left + dx, width_px));
         sum += share * values[at] / 255.0;
@@ -140,8 +140,8 @@ struct Card {
     text.materials = R"({"name":"leaf",)" + material + R"(,"pbrMetallicRoughness":{)" + factor +
                      R"("baseColorTexture":{"index":0)" + texture_extension + "}}}";
     text.extra = R"("textures":[{"source":0,"sampler":0}],"samplers":[{"wrapS":)" +
-                 std::to_string(wrap) + R"(,"wrapT":)" + std::to_string(wrap) +
-                 R"(}],"images":[)" + image + "],";
+                 std::to_string(wrap) + R"(,"wrapT":)" + std::to_string(wrap) + R"(}],"images":[)" +
+                 image + "],";
     return text.json();
   }
 };
@@ -201,15 +201,14 @@ void expect_as_defined(const GltfModel& model, const Opacity& opacity, const Car
   int wrong = 0;
   for (int i = 0; i < 4000; ++i) {
     const glm::dvec2 p(place(random), place(random));
-    const glm::dvec2 uv =
-        image_from_uv(glm::dvec2(card.repeats * p.x, card.repeats * (1.0 - p.y)));
+    const glm::dvec2 uv = image_from_uv(glm::dvec2(card.repeats * p.x, card.repeats * (1.0 - p.y)));
     const bool kept = opacity.at(uv.x, uv.y, card.wrap) >= cutoff;
     bool is_sure = true;
     for (int k = 0; k < 8; ++k) {
       const double angle = 0.25 * std::numbers::pi * k;
       is_sure = is_sure && (opacity.at(uv.x + std::cos(angle) / opacity.width_px,
-                                       uv.y + std::sin(angle) / opacity.height_px, card.wrap) >=
-                            cutoff) == kept;
+                                       uv.y + std::sin(angle) / opacity.height_px,
+                                       card.wrap) >= cutoff) == kept;
     }
     if (!is_sure) continue;
     ++sure;
@@ -260,8 +259,9 @@ TEST(CutOut, the_transform_of_the_texture_counts) {
   Card card;
   card.texture_extension = R"(,"extensions":{"KHR_texture_transform":
       {"offset":[0,1],"rotation":1.57079632679,"scale":[0.5,0.5]}})";
-  expect_as_defined(imported(card.json(embedded(opacity))), opacity, card,
-                    [](glm::dvec2 uv) { return glm::dvec2(0.5 * uv.y, 1.0 - 0.5 * uv.x); }, 0.5);
+  expect_as_defined(
+      imported(card.json(embedded(opacity))), opacity, card,
+      [](glm::dvec2 uv) { return glm::dvec2(0.5 * uv.y, 1.0 - 0.5 * uv.x); }, 0.5);
 }
 
 TEST(CutOut, nothing_is_cut_out_of_an_opaque_image_and_all_of_a_clear_one) {
@@ -310,8 +310,8 @@ TEST(CutOut, images_beside_the_file_and_in_its_buffer_are_read) {
   const double exact = area_of(imported(Card{}.json(embedded(opacity))));
   const auto folder = test_folder();
   write_file(folder / "leaf one.png", opacity.png());
-  const auto beside = import_gltf(
-      write_file(folder / "card.gltf", Card{}.json(R"({"uri":"leaf%20one.png"})")));
+  const auto beside =
+      import_gltf(write_file(folder / "card.gltf", Card{}.json(R"({"uri":"leaf%20one.png"})")));
   ASSERT_TRUE(beside);
   EXPECT_DOUBLE_EQ(area_of(*beside), exact);
   EXPECT_THAT(beside->warnings, Each(Not(HasSubstr("solid"))));
@@ -335,8 +335,8 @@ TEST(CutOut, surfaces_whose_image_cannot_be_read_are_solid_with_a_warning) {
       {R"({"uri":"nowhere.png"})", "nowhere.png: no such file"},
       {R"({"uri":"data:image/png;base64,)" + test::base64("no image at all, only words") + R"("})",
        "neither PNG nor JPEG"},
-      {R"({"uri":"data:image/png;base64,)" +
-           test::base64(disc(32, 9.0).png().substr(0, 60)) + R"("})",
+      {R"({"uri":"data:image/png;base64,)" + test::base64(disc(32, 9.0).png().substr(0, 60)) +
+           R"("})",
        "cannot be decoded"},
       {R"({"bufferView":77,"mimeType":"image/png"})", "bufferView 77 does not exist"},
       {R"({"mimeType":"image/png"})", "neither uri nor bufferView"},

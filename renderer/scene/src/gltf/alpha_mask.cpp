@@ -45,7 +45,8 @@ Wrap wrap_of(int mode) {
 
 /// Takes the opacity of an image with four values a pixel.
 Result<void> take_alpha(const tinygltf::Image& image, double factor, AlphaMask& mask) {
-  const auto pixels = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
+  const auto pixels =
+      static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
   const std::size_t bytes_per_value = image.bits == 16 ? 2 : 1;
   if (image.component != 4 || image.image.size() != pixels * 4 * bytes_per_value) {
     return make_error(ErrorCode::unsupported, "its pixels are of an unknown form");
@@ -85,8 +86,8 @@ Result<void> read_image(const GltfFile& file, int index, double factor, AlphaMas
   // The size is looked at before the decoder takes memory for it.
   const auto [width, height] = png_size(*bytes);
   if (width > kMaxSidePx || height > kMaxSidePx) {
-    return make_error(ErrorCode::unsupported, fmt::format("{} x {} px are more than {} a side",
-                                                          width, height, kMaxSidePx));
+    return make_error(ErrorCode::unsupported,
+                      fmt::format("{} x {} px are more than {} a side", width, height, kMaxSidePx));
   }
   tinygltf::Image image;
   std::string error;
@@ -166,7 +167,8 @@ Result<std::optional<AlphaMask>> read_alpha_mask(const GltfFile& file, int mater
   const tinygltf::Texture& texture = file.model.textures[static_cast<std::size_t>(info.index)];
   if (texture.sampler >= 0) {
     if (static_cast<std::size_t>(texture.sampler) >= file.model.samplers.size()) {
-      return make_error(ErrorCode::parse, fmt::format("sampler {} does not exist", texture.sampler));
+      return make_error(ErrorCode::parse,
+                        fmt::format("sampler {} does not exist", texture.sampler));
     }
     const auto& sampler = file.model.samplers[static_cast<std::size_t>(texture.sampler)];
     mask.wrap_u = wrap_of(sampler.wrapS);
@@ -179,7 +181,8 @@ Result<std::optional<AlphaMask>> read_alpha_mask(const GltfFile& file, int mater
                       fmt::format("texture {} has no image as PNG or JPEG", info.index));
   }
   if (auto read = read_image(file, texture.source, factor, mask); !read) {
-    return tl::unexpected(std::move(read.error()).with_context(fmt::format("image {}", texture.source)));
+    return tl::unexpected(
+        std::move(read.error()).with_context(fmt::format("image {}", texture.source)));
   }
   return std::optional<AlphaMask>(std::move(mask));
 }

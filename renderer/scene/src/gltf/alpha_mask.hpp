@@ -22,8 +22,8 @@ struct AlphaMask {
   float cutoff = 0.5F;
   Wrap wrap_u = Wrap::repeat;
   Wrap wrap_v = Wrap::repeat;
-  int tex_coord = 0;                  ///< N of the attribute TEXCOORD_N
-  glm::dmat3 image_from_uv{1.0};      ///< KHR_texture_transform
+  int tex_coord = 0;              ///< N of the attribute TEXCOORD_N
+  glm::dmat3 image_from_uv{1.0};  ///< KHR_texture_transform
   [[nodiscard]] float at(int x, int y) const {
     return alpha[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_px) +
                  static_cast<std::size_t>(x)];
@@ -36,7 +36,8 @@ struct AlphaMask {
 /// Reads what cuts out the surfaces of a material.
 /// @return nothing where the material is not of `alphaMode` MASK. A mask of one texel stands for a
 /// material without an image, or with one that is opaque everywhere (JPEG).
-/// Errors name the image: not_found, io, parse, unsupported (neither PNG nor JPEG, more than 8192 px).
+/// Errors name the image: not_found, io, parse, unsupported (neither PNG nor JPEG, more than 8192
+/// px).
 [[nodiscard]] physics::Result<std::optional<AlphaMask>> read_alpha_mask(const GltfFile& file,
                                                                         int material);
 

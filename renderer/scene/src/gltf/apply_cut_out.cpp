@@ -67,7 +67,8 @@ std::vector<std::string> apply_cut_out(CutOut& cut_out, const std::vector<glm::d
     glm::dvec3 position(0.0);
     glm::dvec3 normal(0.0);
     for (int c = 0; c < 3; ++c) {
-      const std::uint32_t vertex = surface.indices[3 * corner.triangle + static_cast<std::size_t>(c)];
+      const std::uint32_t vertex =
+          surface.indices[3 * corner.triangle + static_cast<std::size_t>(c)];
       position += corner.shares[c] * surface.positions[vertex];
       if (has_normals) normal += corner.shares[c] * glm::dvec3(surface.normals[vertex]);
     }

@@ -17,8 +17,8 @@ class CutOuts {
  public:
   explicit CutOuts(const GltfFile& file) : file_(file) {}
 
-  /// Returns the mask that cuts out the surfaces of a material; null where there is none. An image that cannot be
-  /// read leaves the surfaces solid, which `warnings` says once.
+  /// Returns the mask that cuts out the surfaces of a material; null where there is none. An image
+  /// that cannot be read leaves the surfaces solid, which `warnings` says once.
   [[nodiscard]] CutOut* find(std::uint32_t material, std::vector<std::string>& warnings);
 
  private:
@@ -33,8 +33,8 @@ struct CutSurface {
   std::vector<std::uint32_t>& indices;
 };
 
-/// Replaces triangles by what the mask keeps of them. Their outlines are within a fifth of a texel; they
-/// are coarser where the primitive would have more than a million triangles.
+/// Replaces triangles by what the mask keeps of them. Their outlines are within a fifth of a texel;
+/// they are coarser where the primitive would have more than a million triangles.
 /// @param uv  texture coordinates, one for each position
 /// @return what there is to say about it, each a sentence for a warning
 [[nodiscard]] std::vector<std::string> apply_cut_out(CutOut& cut_out,

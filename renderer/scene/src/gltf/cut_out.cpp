@@ -109,9 +109,8 @@ class CutOut::Outline {
     for (const std::vector<glm::dvec2>& ring : alpha_rings(mask)) {
       lines.push_back(GEOSGeom_createLineString_r(geos_.get(), geos_.sequence(ring)));
     }
-    const Geos::Shape all = geos_.own(
-        GEOSGeom_createCollection_r(geos_.get(), GEOS_MULTILINESTRING, lines.data(),
-                                    static_cast<unsigned int>(lines.size())));
+    const Geos::Shape all = geos_.own(GEOSGeom_createCollection_r(
+        geos_.get(), GEOS_MULTILINESTRING, lines.data(), static_cast<unsigned int>(lines.size())));
     const Geos::Shape area = geos_.own(GEOSBuildArea_r(geos_.get(), all.get()));
     shape_ = area ? geos_.own(GEOSTopologyPreserveSimplify_r(geos_.get(), area.get(), tolerance_px))
                   : geos_.own(nullptr);
@@ -127,7 +126,8 @@ class CutOut::Outline {
   }
   ~Outline() {
     GEOSSTRtree_destroy_r(geos_.get(), tree_);
-    for (const Polygon& polygon : polygons_) GEOSPreparedGeom_destroy_r(geos_.get(), polygon.prepared);
+    for (const Polygon& polygon : polygons_)
+      GEOSPreparedGeom_destroy_r(geos_.get(), polygon.prepared);
   }
   Outline(const Outline&) = delete;
   Outline& operator=(const Outline&) = delete;
@@ -162,8 +162,8 @@ class CutOut::Outline {
       const Geos::Shape near = geos_.own(GEOSClipByRect_r(geos_.get(), polygon->shape, low.x - 1.0,
                                                           low.y - 1.0, high.x + 1.0, high.y + 1.0));
       const bool sound = near && GEOSisValid_r(geos_.get(), near.get()) == 1;
-      const Geos::Shape piece = geos_.own(GEOSIntersection_r(
-          geos_.get(), sound ? near.get() : polygon->shape, area.get()));
+      const Geos::Shape piece = geos_.own(
+          GEOSIntersection_r(geos_.get(), sound ? near.get() : polygon->shape, area.get()));
       if (!piece || !add_pieces(piece.get(), corners)) {
         corners.resize(before);
         return Kept::failed;
@@ -292,8 +292,8 @@ std::optional<CutTriangles> CutOut::cut(const std::vector<glm::dvec2>& uv,
         whole = one_tile && kept == Outline::Kept::whole;
         const bool is_positive = cross(moved[1] - moved[0], moved[2] - moved[0]) > 0.0;
         for (std::size_t k = 0; k + 2 < corners.size(); k += 3) {
-          const bool turned =
-              (cross(corners[k + 1] - corners[k], corners[k + 2] - corners[k]) > 0.0) != is_positive;
+          const bool turned = (cross(corners[k + 1] - corners[k], corners[k + 2] - corners[k]) >
+                               0.0) != is_positive;
           for (const std::size_t corner : {k, turned ? k + 2 : k + 1, turned ? k + 1 : k + 2}) {
             out.corners.push_back({index, shares_of(moved, corners[corner])});
           }

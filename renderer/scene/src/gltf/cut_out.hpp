@@ -53,7 +53,7 @@ class CutOut {
  private:
   class Outline;
   AlphaMask mask_;
-  double tolerance_px_ = 0.0;         ///< of outline_; 0: there is none yet
+  double tolerance_px_ = 0.0;  ///< of outline_; 0: there is none yet
   std::unique_ptr<Outline> outline_;
 };
 
