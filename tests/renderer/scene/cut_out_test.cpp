@@ -355,6 +355,22 @@ TEST(CutOut, surfaces_whose_image_cannot_be_read_are_solid_with_a_warning) {
   EXPECT_THAT(model.warnings, Contains(AllOf(HasSubstr("TEXCOORD_0"), HasSubstr("solid"))));
 }
 
+TEST(CutOut, coordinates_without_a_place_leave_the_surface_solid_with_a_warning) {
+  for (const char* transform : {R"("scale":[1e300,1e300])", R"("scale":[0,0],"offset":[1e30,3])",
+                                R"("offset":[-1e200,0])"}) {
+    Card card;
+    card.texture_extension =
+        std::string(R"(,"extensions":{"KHR_texture_transform":{)") + transform + "}}";
+    const GltfModel model = imported(card.json(embedded(disc(32, 9.0))));
+    EXPECT_NEAR(area_of(model), 1.0, 1e-6) << transform;
+    EXPECT_THAT(model.warnings, Contains(AllOf(HasSubstr("2 triangles"), HasSubstr("solid"))));
+  }
+  Card far_set;
+  far_set.texture_extension = R"(,"extensions":{"KHR_texture_transform":{"texCoord":1e300}})";
+  EXPECT_THAT(imported(far_set.json(embedded(disc(32, 9.0)))).warnings,
+              Contains(AllOf(HasSubstr("TEXCOORD_1000000"), HasSubstr("solid"))));
+}
+
 TEST(CutOut, an_image_that_repeats_too_often_stays_solid_with_a_warning) {
   Card card;
   card.repeats = 3000.0;

@@ -122,8 +122,15 @@ void take_transform(const tinygltf::TextureInfo& info, AlphaMask& mask) {
   mask.image_from_uv[1] = glm::dvec3(scale_v * std::sin(turn), scale_v * std::cos(turn), 0.0);
   mask.image_from_uv[2] =
       glm::dvec3(number_of(object, "offset", 0, 0.0), number_of(object, "offset", 1, 0.0), 1.0);
-  mask.tex_coord =
-      static_cast<int>(number_of(object, "texCoord", -1, static_cast<double>(mask.tex_coord)));
+  const double set = number_of(object, "texCoord", -1, static_cast<double>(mask.tex_coord));
+  mask.tex_coord = static_cast<int>(std::clamp(set, 0.0, 1e6));
+}
+
+/// The same place of the image near its first copy, so that it fits into an int.
+double near_first(double px, int size, Wrap wrap) {
+  const double period = wrap == Wrap::mirror ? 2.0 * size : static_cast<double>(size);
+  if (wrap == Wrap::clamp) return std::clamp(px, 0.0, period);
+  return px - std::floor(px / period) * period;
 }
 
 int wrapped(int i, int size, Wrap wrap) {
@@ -136,6 +143,8 @@ int wrapped(int i, int size, Wrap wrap) {
 }  // namespace
 
 double alpha_at(const AlphaMask& mask, double x_px, double y_px) {
+  x_px = near_first(x_px, mask.width_px, mask.wrap_u);
+  y_px = near_first(y_px, mask.height_px, mask.wrap_v);
   const double left = std::floor(x_px - 0.5);
   const double top = std::floor(y_px - 0.5);
   const double right_share = x_px - 0.5 - left;

@@ -243,6 +243,13 @@ std::optional<CutTriangles> CutOut::cut(const std::vector<glm::dvec2>& uv,
     const glm::dvec2 low = glm::min(glm::min(triangle[0], triangle[1]), triangle[2]);
     const glm::dvec2 high = glm::max(glm::max(triangle[0], triangle[1]), triangle[2]);
     const double extent = std::max(high.x - low.x, high.y - low.y);
+    // Coordinates beyond this have no place in the image any more.
+    constexpr double kFarthestPx = 1e12;
+    if (!(std::max({-low.x, -low.y, high.x, high.y}) < kFarthestPx)) {
+      out.whole.push_back(index);
+      ++out.uncut;
+      continue;
+    }
     const double area = std::abs(cross(triangle[1] - triangle[0], triangle[2] - triangle[0]));
     if (!(area > kFlatFrac * extent * extent)) {
       // All of it has one place in the image.
