@@ -76,7 +76,7 @@ class PlateFace final : public FaceModel {
         numbers_->emissivity_frac * physics::kStefanBoltzmannWPerM2K4 * face_k * face_k * face_k;
     return {numbers_->absorptance_frac * mix(&LoggerRow::sun_w_m2) +
                 numbers_->emissivity_frac * mix(&LoggerRow::longwave_down_w_m2) - black * face_k -
-                film_w_m2_k * excess_k - latent_w_m2,
+                film_w_m2_k * excess_k - latent_w_m2 - mix(&LoggerRow::evaporation_w_m2),
             -4.0 * black - film_w_m2_k - rise * excess_k - latent_rise};
   }
 

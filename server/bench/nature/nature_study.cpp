@@ -34,6 +34,10 @@ void for_rows(LoggerRecord& record, const auto& change) {
   for (LoggerRow& row : record.rows) change(row);
 }
 
+void change_evaporation(LoggerRecord& record, MeasuredGround& /*ground*/, double sign) {
+  for_rows(record, [&](LoggerRow& row) { row.evaporation_w_m2 *= 1.0 + 0.2 * sign; });
+}
+
 constexpr const char* kSurfrad = "Augustine et al., Bull. Amer. Meteor. Soc. 81 (2000): stations";
 constexpr Input kInputs[] = {
     {"film of the air", "factor 1.3", "spread of published correlations (Palyvos 2008)", false,
@@ -70,6 +74,8 @@ constexpr Input kInputs[] = {
      [](LoggerRecord& record, MeasuredGround&, double sign) {
        for_rows(record, [&](LoggerRow& row) { row.air_k += 0.5 * sign; });
      }},
+    {"evaporation", "20 %, if measured", "closure of eddy covariance (Wilson et al. 2002)", false,
+     change_evaporation},
     {"wind", "0.5 m/s", "propeller anemometer near its threshold", false,
      [](LoggerRecord& record, MeasuredGround&, double sign) {
        for_rows(record,
@@ -166,7 +172,8 @@ class RealTimePlate {
         physics::film_w_m2_k(physics::air_film(reference::air_flow(ground_.setup, row)),
                              {0.0, 0.0, 1.0}, ground_.setup.roughness, before_k - row.air_k);
     physics::FosterDrive<double> out{.absorbed_w_m2 = n.absorptance_frac * row.sun_w_m2 +
-                                                      n.emissivity_frac * row.longwave_down_w_m2,
+                                                      n.emissivity_frac * row.longwave_down_w_m2 -
+                                                      row.evaporation_w_m2,
                                      .film_w_m2_k = film_w_m2_k,
                                      .air_offset_k = row.air_k - surface_.reference_k};
     physics::add_moisture(
@@ -222,6 +229,11 @@ Result<NatureCase> study_case(const LoggerRecord& record, const MeasuredGround& 
   std::vector<double> above(base->model_k.size());
   for (const Input& input : kInputs) {
     if (input.ground && is_fitted) continue;
+    if (input.change == change_evaporation && !ground.measured_evaporation) {
+      on_run();  // both ends count as done
+      on_run();
+      continue;
+    }
     InputEffect effect{input.name, std::string("+-") + input.range, input.source, 0, 0, {}, {}};
     std::vector<double> lowest(below.size());
     std::vector<double> highest(below.size());

@@ -229,7 +229,7 @@ void add_measured_fit_options(CommandLine& line, MeasuredFitOptions& options) {
       "Fit numbers of level ground to a logger's record instead, CSV with time_s, ghi_w_m2 "
       "(or dni_w_m2 and dhi_w_m2), longwave_down_w_m2, air_k or air_c, wind_m_s (or "
       "film_w_m2_k) and surface_k, surface_c or longwave_up_w_m2; optional: "
-      "reflected_w_m2, rh_pct, latent_w_m2");
+      "reflected_w_m2, rh_pct, latent_w_m2 (evaporation, which dry materials lose)");
   line.option("--number", options.numbers,
               "Number to fit with --measured: absorptance; inertia, a factor on conductivity and "
               "heat capacity of all layers; film, a factor; base, the temperature below the last "

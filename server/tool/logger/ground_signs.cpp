@@ -74,8 +74,14 @@ void add_signs_of_words(const LoggerRecord& record, const MeasuredGround& ground
   const std::string_view plant =
       stated_word(record.words, {"grass", "lawn", "pasture", "meadow", "crop", "crops", "canopy",
                                  "forest", "corn", "soybeans", "wheat", "vegetation"});
-  const bool evaporates = !ground.setup.moisture.dry();
-  if (!plant.empty() && evaporates) {
+  const bool evaporates = !ground.setup.moisture.dry() || ground.measured_evaporation;
+  if (!plant.empty() && ground.measured_evaporation) {
+    signs.push_back({"vegetation",
+                     fmt::format("the file speaks of '{}': its evaporation is measured, but leaves "
+                                 "are not layers of soil",
+                                 plant),
+                     false});
+  } else if (!plant.empty() && evaporates) {
     signs.push_back({"vegetation",
                      fmt::format("the file speaks of '{}': plants evaporate as material '{}' "
                                  "states, which is not measured, and their leaves are not layers "
@@ -94,7 +100,9 @@ void add_signs_of_words(const LoggerRecord& record, const MeasuredGround& ground
     signs.push_back(
         {"wet",
          evaporates
-             ? fmt::format("the file speaks of '{}': how wet the ground is, is not measured", wet)
+             ? fmt::format("the file speaks of '{}': how water moves the conductivity of the "
+                           "ground is not known",
+                           wet)
              : fmt::format("the file speaks of '{}': wet ground evaporates, dry layers do not",
                            wet),
          !evaporates});
@@ -120,7 +128,7 @@ void add_signs_of_words(const LoggerRecord& record, const MeasuredGround& ground
 
 void add_signs_of_moisture(const LoggerRecord& record, const MeasuredGround& ground,
                            const DayHeat& heat, std::vector<GroundSign>& signs) {
-  const bool breaks = ground.setup.moisture.dry();
+  const bool breaks = ground.setup.moisture.dry() && !ground.measured_evaporation;
   double latent_w_m2 = 0.0;
   double hours = 0.0;
   for (std::size_t i = 0; i < record.latent_w_m2.size(); ++i) {
@@ -132,7 +140,8 @@ void add_signs_of_moisture(const LoggerRecord& record, const MeasuredGround& gro
   if (hours > 0.0 && latent_w_m2 / hours > kMuchWM2) {
     signs.push_back(
         {"evaporation",
-         fmt::format("evaporation takes {:.0f} W/m2 by day, measured", latent_w_m2 / hours),
+         fmt::format("evaporation takes {:.0f} W/m2 by day, measured{}", latent_w_m2 / hours,
+                     ground.measured_evaporation ? ": the ground loses it, known to 20 %" : ""),
          breaks});
   } else if (heat.hours > 0.0 && heat.least_missing_w_m2 > kMuchWM2 &&
              heat.least_missing_w_m2 > 0.1 * heat.net_radiation_w_m2) {

@@ -24,7 +24,7 @@
 /// `surface_k`, `surface_c` | yes | | air | `air_k`, `air_c` | yes | | wind, 10 m up | `wind_m_s` |
 /// this or `film_w_m2_k` | | film of the air | `film_w_m2_k` | no | | relative humidity | `rh_pct`
 /// | no: for moist materials and signs of dew | | heat that evaporation takes | `latent_w_m2` | no:
-/// for signs of moisture |
+/// dry materials lose it |
 ///
 /// An empty cell, `nan` and codes at or below -999 mean that the value is missing; rows without a
 /// needed value are left out and counted. Direct and diffuse sun win over global sun, whose

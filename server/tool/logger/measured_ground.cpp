@@ -69,11 +69,28 @@ std::pair<double, std::string> base_of(const GroundOptions& options, const Logge
           is_ground ? "annual wave of the ground by latitude, height and date" : "mean of the air"};
 }
 
+/// Gives dry ground the evaporation that the record measured. A missing value counts as none.
+void set_measured_evaporation(LoggerRecord& record, MeasuredGround& ground) {
+  std::size_t missing = 0;
+  for (std::size_t i = 0; i < record.latent_w_m2.size(); ++i) {
+    const bool is_measured = !std::isnan(record.latent_w_m2[i]);
+    record.rows[i].evaporation_w_m2 = is_measured ? record.latent_w_m2[i] : 0.0;
+    if (!is_measured) ++missing;
+  }
+  if (record.latent_w_m2.empty() || missing == record.latent_w_m2.size()) return;
+  ground.measured_evaporation = true;
+  ground.origins.push_back("evaporation: of the record (latent_w_m2)");
+  if (missing == 0) return;
+  record.notes.push_back(
+      fmt::format("latent_w_m2 is missing in {} of {} rows, which count as without evaporation",
+                  missing, record.latent_w_m2.size()));
+}
+
 /// Gives moist ground its exchange of water, if the record has the humidity of the air. A missing
 /// value takes the one before, or the first one.
 void set_moisture(LoggerRecord& record, MeasuredGround& ground) {
   const physics::MoistSurface moisture = scene::moisture_of(ground.material);
-  if (moisture.dry()) return;
+  if (moisture.dry()) return set_measured_evaporation(record, ground);
   const auto first =
       std::ranges::find_if(record.rh_frac, [](double rh) { return !std::isnan(rh); });
   if (first == record.rh_frac.end()) {

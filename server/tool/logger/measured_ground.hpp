@@ -26,7 +26,8 @@ struct MeasuredGround {
   reference::PlateSetup setup;
   reference::PlateNumbers numbers;  ///< before any fit
   bool absorptance_measured = false;
-  std::vector<std::string> origins;  ///< where every number comes from
+  bool measured_evaporation = false;  ///< of dry ground: rows lose the record's latent heat
+  std::vector<std::string> origins;   ///< where every number comes from
 };
 
 /// Returns the ground before any fit, and gives the record the temperature of the surface for its

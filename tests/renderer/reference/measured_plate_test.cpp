@@ -208,6 +208,24 @@ TEST(MeasuredPlate, stated_film_takes_the_place_of_the_wind) {
   EXPECT_NEAR(history_k->back(), 290.0 + 20.0 * 18.0 / 43.0, 1e-3);
 }
 
+TEST(MeasuredPlate, ground_loses_the_measured_evaporation) {
+  std::vector<LoggerRow> rows = clear_day(1800.0);
+  PlateSetup setup = soil();
+  setup.layers = {{0.02, 0.5, 1500.0, 1000.0}};  // 25 W m-2 K-1, settles within the day
+  for (LoggerRow& row : rows) {
+    row.sun_w_m2 = 600.0;
+    row.longwave_down_w_m2 = 0.0;
+    row.air_k = 290.0;
+    row.film_w_m2_k = 15.0;
+    row.evaporation_w_m2 = 100.0;
+  }
+  const auto history_k = plate_history_k(
+      setup, rows, {.absorptance_frac = 0.5, .base_k = 290.0, .emissivity_frac = 1e-6});
+  ASSERT_TRUE(history_k) << history_k.error().text;
+  // Of the 300 W/m2 that are absorbed, 200 pass the film and the layer side by side.
+  EXPECT_NEAR(history_k->back(), 290.0 + 200.0 / 40.0, 1e-3);
+}
+
 TEST(MeasuredPlate, heat_into_the_ground_closes_the_balance_of_the_model) {
   const PlateSetup setup = soil();
   const PlateNumbers numbers{.absorptance_frac = 0.75, .base_k = 286.0};

@@ -197,6 +197,43 @@ TEST(CliBenchNature, moist_ground_evaporates_where_the_humidity_is_known) {
   EXPECT_NEAR(bias(known, "nothing_fitted_real_time"), bias(known, "nothing_fitted"), 0.3);
 }
 
+TEST(CliBenchNature, dry_ground_loses_the_evaporation_that_was_measured) {
+  const TemporaryFolder folder;
+  std::istringstream lines(logger_text(kHeader));
+  std::string measured;
+  int row = 0;
+  for (std::string line; std::getline(lines, line);) {
+    if (line[0] == '#') {
+      measured += line + "\n";
+    } else if (line.starts_with("time_s")) {
+      measured += line + ",latent_w_m2\n";
+    } else {
+      measured += line + (++row == 5 ? ",nan\n" : ",60\n");
+    }
+  }
+  write_text(folder.file("measured.csv"), measured);
+  write_text(folder.file("unknown.csv"), logger_text(kHeader));
+  const auto report = [&](const std::string& name) {
+    const ProcessResult bench = run_emit({"bench", "nature", folder.file(name), "--surface",
+                                          "moist", "--json", folder.file("n.json")},
+                                         std::chrono::seconds(120));
+    EXPECT_EQ(bench.exit_code, 0) << bench.err;
+    return bench.out + read_text(folder.file("n.json"));
+  };
+  const std::string known = report("measured.csv");
+  const std::string unknown = report("unknown.csv");
+  EXPECT_THAT(known, HasSubstr("evaporation: of the record (latent_w_m2)"));
+  EXPECT_THAT(known, HasSubstr("latent_w_m2 is missing in 1 of "));
+  EXPECT_THAT(known, HasSubstr("evaporation takes 60 W/m2 by day, measured: the ground loses it"));
+  EXPECT_THAT(known, HasSubstr("\"dry_layers_hold\": true"));
+  EXPECT_THAT(unknown, HasSubstr("\"dry_layers_hold\": false"));
+  const auto bias = [](const std::string& json, const std::string& part) {
+    return json_numbers(json.substr(json.find("\"" + part + "\"")), "bias_k").front();
+  };
+  EXPECT_LT(bias(known, "nothing_fitted"), bias(unknown, "nothing_fitted") - 1.0);
+  EXPECT_NEAR(bias(known, "nothing_fitted_real_time"), bias(known, "nothing_fitted"), 0.3);
+}
+
 /// The day of logger_text() as a moist one, colder and windier, with a humidity in every row.
 std::string moist_text(double colder_k, double wind_m_s) {
   std::istringstream lines(logger_text(kHeader));

@@ -21,10 +21,11 @@ struct LoggerRow {
   double sun_w_m2 = 0.0;            ///< direct and diffuse sun on the face, >= 0
   double longwave_down_w_m2 = 0.0;  ///< from the whole sky
   double air_k = 0.0;
-  double wind_m_s = 0.0;     ///< 10 m above the ground, >= 0
-  double film_w_m2_k = 0.0;  ///< stated film of the air; 0: from wind and temperatures
-  double surface_k = 0.0;    ///< measured; fit_plate() alone reads it
-  double vapour_pa = 0.0;    ///< of the air; counts where the ground is moist
+  double wind_m_s = 0.0;          ///< 10 m above the ground, >= 0
+  double film_w_m2_k = 0.0;       ///< stated film of the air; 0: from wind and temperatures
+  double surface_k = 0.0;         ///< measured; fit_plate() alone reads it
+  double vapour_pa = 0.0;         ///< of the air; counts where the ground is moist
+  double evaporation_w_m2 = 0.0;  ///< measured heat that evaporation takes; dew is negative
 };
 
 /// Properties of the ground that a logger can show.
