@@ -81,6 +81,16 @@ Rgb grey_color(double value_frac) {
   return {level, level, level};
 }
 
+Rgb difference_color(double value_frac) {
+  constexpr double kBlueDeg = 255.0;
+  constexpr double kOrangeDeg = 55.0;
+  const double strength = std::abs(2.0 * value_frac - 1.0);
+  const double lightness = 0.16 + 0.62 * strength;
+  const double hue_rad = (value_frac < 0.5 ? kBlueDeg : kOrangeDeg) * physics::kDegree;
+  const LinearRgb color = linear_from_oklch(lightness, 0.14 * strength, hue_rad);
+  return {srgb_byte(color[0]), srgb_byte(color[1]), srgb_byte(color[2])};
+}
+
 std::array<Rgb, 256> build_table(Rgb (*color)(double)) {
   std::array<Rgb, 256> table{};
   for (std::size_t i = 0; i < table.size(); ++i) {
@@ -143,6 +153,8 @@ void draw_color_bar(RgbImage& image, std::uint32_t left_px, const FalseColorOpti
 const std::array<Rgb, 256>& color_table(ColorMap map) noexcept {
   static const std::array<Rgb, 256> thermal = build_table(thermal_color);
   static const std::array<Rgb, 256> grey = build_table(grey_color);
+  static const std::array<Rgb, 256> difference = build_table(difference_color);
+  if (map == ColorMap::difference) return difference;
   return map == ColorMap::grey ? grey : thermal;
 }
 

@@ -11,6 +11,7 @@
 
 #include "emit/client/security.hpp"
 #include "emit/physics/error.hpp"
+#include "emit/physics/frames.hpp"
 #include "tool/view/view_control.hpp"
 
 namespace emit::tool::view {
@@ -43,6 +44,17 @@ struct ViewFrame {
   std::int64_t sim_time_ns = 0;
   std::uint32_t flags = 0;
   double frame_ms = 0.0;  ///< time to make it, or pose to reception
+
+  // Of scenarios alone. Planes are NaN where there is sky; `material` has no meaning there.
+  physics::Pose sensor_pose;
+  std::vector<float> material;  ///< index into `material_names`
+  std::vector<float> sun_cosine;
+  std::vector<float> sky_frac;
+  std::vector<std::uint32_t> sample_px;  ///< pixels that hold a thermal sample, if asked for
+  std::shared_ptr<const std::vector<std::string>> material_names;
+  std::uint8_t quality_level = 0;
+  /// Lines about the pixel that was asked for last; null: none yet.
+  std::shared_ptr<const std::vector<std::string>> report;
 };
 
 /// Reason why no more frames come.
@@ -81,6 +93,12 @@ class FrameProvider {
   [[nodiscard]] virtual std::string band() const = 0;
   /// Returns the initial limits of the false colours, K.
   virtual void limits(double& min_k, double& max_k) const = 0;
+  /// Returns the local solar time of an instant, 0..24 h; empty: the source has a clock of its own.
+  [[nodiscard]] virtual std::optional<double> solar_hour(std::int64_t /*sim_time_ns*/) const {
+    return std::nullopt;
+  }
+  /// Returns how much of a jump in time is done, 0..1; empty: there is none.
+  [[nodiscard]] virtual std::optional<double> travelled_frac() const { return std::nullopt; }
 };
 
 /// Renders a scenario on a thread that owns the GL context of the renderer. Errors: those of

@@ -32,7 +32,7 @@ uniform sampler2D picture;
 void main() { color = vec4(texture(picture, uv).rgb, 1.0); }
 )";
 
-constexpr std::array<std::pair<int, Key>, 28> kKeys{{
+constexpr std::array<std::pair<int, Key>, 37> kKeys{{
     {GLFW_KEY_LEFT, Key::left},
     {GLFW_KEY_RIGHT, Key::right},
     {GLFW_KEY_UP, Key::up},
@@ -60,6 +60,15 @@ constexpr std::array<std::pair<int, Key>, 28> kKeys{{
     {GLFW_KEY_T, Key::quantity},
     {GLFW_KEY_HOME, Key::home},
     {GLFW_KEY_H, Key::home},
+    {GLFW_KEY_1, Key::overlay_1},
+    {GLFW_KEY_2, Key::overlay_2},
+    {GLFW_KEY_3, Key::overlay_3},
+    {GLFW_KEY_4, Key::overlay_4},
+    {GLFW_KEY_5, Key::overlay_5},
+    {GLFW_KEY_6, Key::overlay_6},
+    {GLFW_KEY_M, Key::color_map},
+    {GLFW_KEY_L, Key::quality_level},
+    {GLFW_KEY_X, Key::explain},
     {GLFW_KEY_ESCAPE, Key::close},
 }};
 
@@ -130,6 +139,10 @@ class GlfwWindow final : public Window {
       input_.drag_y_px += (y - drag_y_) * scale;
     }
     dragging_ = pressed;
+    input_.left_down = pressed;
+    const bool right = glfwGetMouseButton(window_, GLFW_MOUSE_BUTTON_RIGHT) == GLFW_PRESS;
+    input_.right_press = right && !right_down_;
+    right_down_ = right;
     drag_x_ = x;
     drag_y_ = y;
     input_.closed = glfwWindowShouldClose(window_) == GLFW_TRUE;
@@ -231,6 +244,7 @@ class GlfwWindow final : public Window {
   std::uint32_t picture_height_ = 0;
   WindowInput input_;
   bool dragging_ = false;
+  bool right_down_ = false;
   double drag_x_ = 0.0;
   double drag_y_ = 0.0;
 };

@@ -32,6 +32,15 @@ enum class Key : std::uint8_t {
   auto_range,
   quantity,
   home,
+  overlay_1,
+  overlay_2,
+  overlay_3,
+  overlay_4,
+  overlay_5,
+  overlay_6,
+  color_map,
+  quality_level,
+  explain,
   close
 };
 
@@ -40,7 +49,9 @@ struct WindowInput {
   std::vector<Key> keys;   ///< presses and repeats, in order
   double drag_x_px = 0.0;  ///< left button, in image pixels
   double drag_y_px = 0.0;
-  double wheel = 0.0;  ///< positive: away from the user
+  double wheel = 0.0;      ///< positive: away from the user
+  bool left_down = false;  ///< the left button is down now
+  bool right_press = false;
   bool closed = false;
 };
 

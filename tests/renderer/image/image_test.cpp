@@ -235,6 +235,18 @@ TEST(FalseColor, lightness_never_falls_along_a_map) {
   }
 }
 
+TEST(FalseColor, differences_are_dark_in_the_middle_and_blue_or_orange_outside) {
+  const auto& table = color_table(ColorMap::difference);
+  for (std::size_t i = 1; i < 128; ++i) {
+    EXPECT_LE(luma(table[i]), luma(table[i - 1]) + 1.0) << i;
+    EXPECT_GE(luma(table[128 + i]) + 1.0, luma(table[127 + i])) << i;
+    EXPECT_NEAR(luma(table[i]), luma(table[255 - i]), 8.0) << "no side looks larger: " << i;
+  }
+  EXPECT_GT(table[0][2], table[0][0] + 60);
+  EXPECT_GT(table[255][0], table[255][2] + 60);
+  EXPECT_LT(luma(table[128]), 25.0);
+}
+
 TEST(FalseColor, values_map_to_their_place_and_nan_to_its_own_colour) {
   const std::vector<float> values{280.0F, 330.0F, 305.125F, 100.0F, kInf, kNan};
   const physics::Result<RgbImage> image = false_color(values, 6, 1, {});

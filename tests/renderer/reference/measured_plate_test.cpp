@@ -222,7 +222,7 @@ TEST(MeasuredPlate, ground_loses_the_measured_evaporation) {
   const auto history_k = plate_history_k(
       setup, rows, {.absorptance_frac = 0.5, .base_k = 290.0, .emissivity_frac = 1e-6});
   ASSERT_TRUE(history_k) << history_k.error().text;
-  // Of the 300 W/m2 that are absorbed, 200 pass the film and the layer side by side.
+  // The face absorbs 300 W/m2, and 200 of them pass the film and the layer side by side.
   EXPECT_NEAR(history_k->back(), 290.0 + 200.0 / 40.0, 1e-3);
 }
 

@@ -2,7 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
+#include <set>
+#include <string>
+#include <vector>
 
 #include "support/emit_process.hpp"
 
@@ -95,6 +99,48 @@ TEST(CliView, shows_a_scenario_in_a_window) {
   EXPECT_EQ(result.out, "2 frames shown\n");
   // The size is some kilobytes: a window of one colour would compress to less.
   EXPECT_GT(std::filesystem::file_size(folder.file("view.png")), 4000U);
+}
+
+TEST(CliView, overlays_show_a_scenario_and_its_error_against_a_reference) {
+  if (run_process({"xvfb-run", "--help"}).exit_code != 0) GTEST_SKIP() << "xvfb-run is missing";
+  const TemporaryFolder folder;
+  const std::vector<std::string> scene{
+      "box",   "--set",          "sensor.width_px=160", "--set", "sensor.height_px=120",
+      "--set", "thermal.steps=5"};
+  std::vector<std::string> render{"render", "--time-s", "1", "--out", folder.file("box.exr")};
+  render.insert(render.end(), scene.begin(), scene.end());
+  ASSERT_EQ(run_emit(render).exit_code, 0);
+  std::set<std::string> pictures;
+  for (const std::string overlay : {"picture", "materials", "sun", "sky", "error"}) {
+    std::vector<std::string> view{"xvfb-run",
+                                  "-a",
+                                  "-s",
+                                  "-screen 0 1280x1024x24",
+                                  std::string(EMIT_TEST_BIN_DIR) + "/emit",
+                                  "view",
+                                  "--frames",
+                                  "2",
+                                  "--overlay",
+                                  overlay,
+                                  "--reference",
+                                  folder.file("box.exr"),
+                                  "--screenshot",
+                                  folder.file("view.png")};
+    view.insert(view.end(), scene.begin(), scene.end());
+    const ProcessResult result = run_process(view, std::chrono::seconds(120));
+    ASSERT_EQ(result.exit_code, 0) << overlay << result.out << result.err;
+    pictures.insert(read_text(folder.file("view.png")));
+  }
+  EXPECT_EQ(pictures.size(), 5U) << "every overlay shows something else";
+}
+
+TEST(CliView, overlays_that_cannot_be_shown_are_refused) {
+  const ProcessResult stream = run_emit({"view", "tcp://127.0.0.1:1", "--overlay", "materials"});
+  EXPECT_EQ(stream.exit_code, 2);
+  EXPECT_NE(stream.err.find("a stream has pixels alone"), std::string::npos) << stream.err;
+  const ProcessResult error = run_emit({"view", "box", "--overlay", "error"});
+  EXPECT_EQ(error.exit_code, 2);
+  EXPECT_NE(error.err.find("--reference"), std::string::npos) << error.err;
 }
 
 TEST(CliView, without_a_display_it_says_so) {

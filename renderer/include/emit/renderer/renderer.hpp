@@ -337,7 +337,7 @@ class Renderer {
   [[nodiscard]] virtual std::optional<std::uint32_t> nearest_sample(
       const SurfacePlace& place) const noexcept = 0;
   /// Reads a sample. RT-safe.
-  /// @pre nearest_sample() returned the number.
+  /// @pre nearest_sample() returned the number, or it is below SceneStats::samples.
   [[nodiscard]] virtual SampleReading sample_reading(std::uint32_t sample) const noexcept = 0;
 
   /// Splits the radiance of a pixel of the latest frame by band. `normal_up` is the vertical

@@ -13,8 +13,9 @@ namespace emit::image {
 
 /// Colour maps for display. `thermal` runs from black over violet, red and orange to white. Its
 /// lightness rises evenly, so equal steps of the value look equal, and it reads in grey as well.
-/// `grey` has even lightness.
-enum class ColorMap : std::uint8_t { thermal, grey };
+/// `grey` has even lightness. `difference` is dark in the middle and goes to blue below and to
+/// orange above.
+enum class ColorMap : std::uint8_t { thermal, grey, difference };
 
 /// Returns the 256 colours of a map, from minimum to maximum. RT-safe after the first call.
 [[nodiscard]] const std::array<Rgb, 256>& color_table(ColorMap map) noexcept;
