@@ -79,7 +79,7 @@ server/tool/logger: server/tool/command_line server/tool/support config/include 
 server/tool/streams: server/tool/command_line server/tool/support server/app server/client server/rt protocol renderer/image renderer/physics renderer/scene
 server/tool/replay: server/tool/command_line server/tool/streams server/tool/support server/agents server/app server/console server/net server/telemetry protocol renderer/physics
 server/tool/foxglove: server/tool/command_line server/tool/streams server/tool/support protocol renderer/image renderer/physics
-server/tool/view: server/tool/support server/tool/streams server/client renderer/image renderer/include renderer/physics
+server/tool/view: server/tool/support server/tool/streams server/tool/offline server/client renderer/image renderer/include renderer/physics
 server/tool/report: server/tool/support renderer/physics
 server/tool/engage: server/tool/command_line server/tool/report server/tool/support server/tool/streams server/client server/engage config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
 server/bench/nature: server/tool/command_line server/tool/logger server/tool/support renderer/physics renderer/reference renderer/scene

@@ -54,6 +54,11 @@ FILES = {
             "What the uncertainty of each input does to the surfaces of a picture, with each input at both ends of its "
             "range and all others as they are.",
             "emit bench uncertainty block-on-road"),
+        "uncertainty-airfield": (
+            "The same of the demonstration's scene, with coarse surfaces: the figures are differences of pictures that "
+            "have the same surfaces.",
+            "emit bench uncertainty airfield --time-s 6 --set thermal.tolerance_k=8 --set thermal.max_samples=60000 "
+            "--set sensor.width_px=320 --set sensor.height_px=256"),
         "gas": (
             "Frame time of the scenario `decoys` with each kind of gas, beside the same scene without gas.",
             "emit bench gas"),

@@ -161,7 +161,7 @@ image::Rgb material_color(std::size_t material, double brightness_frac) noexcept
   const auto part = [&](double offset) {
     const double distance = std::abs(std::fmod(6.0 * turn + offset, 6.0) - 3.0);
     const double pure = std::clamp(distance - 1.0, 0.0, 1.0);
-    return static_cast<std::uint8_t>(std::lround(255.0 * value * std::lerp(0.25, 1.0, pure)));
+    return static_cast<std::uint8_t>(std::lround(255.0 * value * std::lerp(0.4, 1.0, pure)));
   };
   return {part(0.0), part(4.0), part(2.0)};
 }
