@@ -79,7 +79,6 @@ server/tool/logger: server/tool/command_line server/tool/support config/include 
 server/tool/streams: server/tool/command_line server/tool/support server/app server/client server/rt protocol renderer/image renderer/physics renderer/scene
 server/tool/replay: server/tool/command_line server/tool/streams server/tool/support server/agents server/app server/console server/net server/telemetry protocol renderer/physics
 server/tool/foxglove: server/tool/command_line server/tool/streams server/tool/support protocol renderer/image renderer/physics
-server/tool/view: server/tool/support server/tool/streams server/tool/offline server/client renderer/image renderer/include renderer/physics
 server/tool/report: server/tool/support renderer/physics
 server/tool/engage: server/tool/command_line server/tool/report server/tool/support server/tool/streams server/client server/engage config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
 server/bench/nature: server/tool/command_line server/tool/logger server/tool/support renderer/physics renderer/reference renderer/scene
@@ -92,6 +91,7 @@ server/tool/truth: server/tool/support renderer/physics renderer/reference rende
 server/tool/doctor: server/tool/command_line server/tool/support config/include renderer/include
 server/tool/nature: server/tool/command_line server/tool/support config/include renderer/physics renderer/scene
 server/tool/offline: server/agents server/app server/tool/command_line server/tool/report server/tool/support server/tool/truth protocol renderer/include renderer/physics renderer/reference renderer/scene
+server/tool/view: server/tool/support server/tool/streams server/tool/offline server/client renderer/image renderer/include renderer/physics renderer/scene
 server/tool/campaign: server/app server/client server/tool/command_line server/tool/offline server/tool/report server/tool/streams server/tool/support config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
 server/tool/scenes: server/tool/command_line server/tool/offline server/tool/support config/include renderer/image renderer/include renderer/physics renderer/reference renderer/scene renderer/scene/generate
 server/tool/commands: server/tool/doctor server/tool/foxglove server/tool/scenes server/tool/nature server/tool/campaign server/tool/command_line server/tool/offline server/tool/engage server/tool/truth server/tool/support server/tool/replay server/tool/streams server/tool/view server/tool/fms_sim server/gnss server/motion server/agents server/agents/render server/app server/client server/net server/rt config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene

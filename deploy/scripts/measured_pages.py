@@ -57,8 +57,8 @@ FILES = {
         "uncertainty-airfield": (
             "The same of the demonstration's scene, with coarse surfaces: the figures are differences of pictures that "
             "have the same surfaces.",
-            "emit bench uncertainty airfield --time-s 6 --set thermal.tolerance_k=8 --set thermal.max_samples=60000 "
-            "--set sensor.width_px=320 --set sensor.height_px=256"),
+            "emit bench uncertainty airfield --time-s 6 --set thermal.tolerance_k=8 \\\n"
+            "  --set thermal.max_samples=60000 --set sensor.width_px=320 --set sensor.height_px=256"),
         "gas": (
             "Frame time of the scenario `decoys` with each kind of gas, beside the same scene without gas.",
             "emit bench gas"),
