@@ -319,26 +319,22 @@ Result<std::vector<BandEffects>> study(const UncertaintyOptions& options, double
 }
 
 /// Bars of an input from its low to its high end, the largest first.
-Plot tornado_of(const UncertaintyOptions& options, double time_s, const BandEffects& band) {
-  Plot plot{.title = fmt::format("{} at {:g} s, {} um: +-{:.2f} K RMS in all", options.scenario,
-                                 time_s, band.band, band.all_k()),
-            .x = {.label = "input"},
-            .y = {.label = "mean shift of the surfaces, K"},
-            .series = {}};
-  PlotSeries bars{.label = "low to high end", .points = {}};
+Tornado tornado_of(const UncertaintyOptions& options, double time_s, const BandEffects& band) {
+  Tornado tornado{.title = fmt::format("{} at {:g} s, {} um: {:.2f} K RMS in all", options.scenario,
+                                       time_s, band.band, band.all_k()),
+                  .label = "mean shift of the surfaces, K; at the right the RMS over the picture",
+                  .bars = {}};
   for (const Effect& effect : band.effects) {
     if (!effect.acts()) continue;
-    plot.x.names.push_back(effect.input->name);
-    const auto [low, high] = std::minmax(effect.low.mean_k, effect.high.mean_k);
-    bars.points.push_back(
-        {.x = static_cast<double>(plot.x.names.size()),
-         .y = 0.0,
+    tornado.bars.push_back(
+        {.label = effect.input->name,
          .title = fmt::format("{}, {}: {:+.2f} to {:+.2f} K", effect.input->name,
                               effect.input->range, effect.low.mean_k, effect.high.mean_k),
-         .range = PlotRange{low, high}});
+         .at_low = effect.low.mean_k,
+         .at_high = effect.high.mean_k,
+         .note = fmt::format("{:.2f} K", effect.rms_k())});
   }
-  plot.series.push_back(std::move(bars));
-  return plot;
+  return tornado;
 }
 
 Json shift_json(const Shift& shift) {
@@ -357,7 +353,7 @@ int run(const UncertaintyOptions& options) {
   std::FILE* text = text_stream(options.json);
   fmt::print(text, "{} at {:g} s, {}, commit {}\n", options.scenario, time_s, device, kCommit);
   Json results = Json::array();
-  std::vector<Plot> plots;
+  std::vector<Tornado> plots;
   for (const BandEffects& band : *bands) {
     TextTable table({"input", "range", "mean low K", "mean high K", "rms K", "p99 K"});
     Json inputs = Json::array();

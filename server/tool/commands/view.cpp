@@ -214,7 +214,7 @@ void Viewer::handle(Key key) {
       map_ = map_ == image::ColorMap::thermal ? image::ColorMap::grey : image::ColorMap::thermal;
       break;
     case Key::quality_level:
-      // Behind the last level, which takes the place of all above it, comes full quality again.
+      // The last level takes the place of all above it: full quality comes next.
       control_.quality_level = static_cast<std::uint8_t>(
           frame_.quality_level < control_.quality_level ? 0 : control_.quality_level + 1);
       break;

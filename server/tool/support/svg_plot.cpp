@@ -300,14 +300,87 @@ class PlotWriter {
   std::size_t left_out_ = 0;
 };
 
-}  // namespace
+/// Writes one tornado plot of a given height.
+class TornadoWriter {
+ public:
+  static constexpr double kTornadoWidth = 640.0;
+  TornadoWriter(const Tornado& tornado, double height, std::string& out)
+      : tornado_(tornado), height_(height), out_(out), x_(PlotScale::linear, kNames, kNotes) {
+    x_.include(0.0);
+    for (const TornadoBar& bar : tornado.bars) {
+      x_.include(bar.at_low);
+      x_.include(bar.at_high);
+    }
+    x_.settle();
+  }
+  [[nodiscard]] static double height_of(const Tornado& tornado) {
+    return kTop + kLegendLine + kRow * static_cast<double>(tornado.bars.size()) + kFoot;
+  }
 
-std::string svg_document(const std::vector<Plot>& plots, std::size_t columns) {
-  columns = std::clamp<std::size_t>(columns, 1, std::max<std::size_t>(1, plots.size()));
-  const std::size_t rows = (plots.size() + columns - 1) / columns;
-  const double width = kWidth * static_cast<double>(columns);
-  const double height = kHeight * static_cast<double>(std::max<std::size_t>(rows, 1));
-  std::string out = fmt::format(
+  void write() {
+    const double middle = 0.5 * (kNames + kNotes);
+    const double bottom = height_ - kFoot;
+    append(R"(<text x="{:.1f}" y="20" text-anchor="middle" class="title">{}</text>)", middle,
+           escaped(tornado_.title));
+    write_legend(kNames, kLow, "input at its low end");
+    write_legend(middle, kHigh, "at its high end");
+    for (const Scale::Tick& tick : x_.ticks()) {
+      const double at = x_.px(tick.value);
+      append(R"(<line x1="{0:.1f}" x2="{0:.1f}" y1="{1}" y2="{2}" class="grid"/>)", at,
+             kTop + kLegendLine, bottom);
+      append(R"(<text x="{:.1f}" y="{}" text-anchor="middle">{:g}</text>)", at, bottom + 16.0,
+             tick.value);
+    }
+    double y = kTop + kLegendLine;
+    for (const TornadoBar& bar : tornado_.bars) {
+      append(R"(<text x="{}" y="{:.1f}" text-anchor="end">{}</text>)", kNames - 8.0,
+             y + 0.5 * kRow + 4.0, escaped(bar.label));
+      write_bar(bar.at_low, y, kLow, bar.title);
+      write_bar(bar.at_high, y, kHigh, bar.title);
+      append(R"(<text x="{}" y="{:.1f}">{}</text>)", kNotes + 8.0, y + 0.5 * kRow + 4.0,
+             escaped(bar.note));
+      y += kRow;
+    }
+    append(R"(<line x1="{0:.1f}" x2="{0:.1f}" y1="{1}" y2="{2}" class="frame"/>)", x_.px(0.0),
+           kTop + kLegendLine, bottom);
+    append(R"(<text x="{:.1f}" y="{}" text-anchor="middle">{}</text>)", middle, height_ - 10.0,
+           escaped(tornado_.label));
+  }
+
+ private:
+  static constexpr double kNames = 190.0;  ///< right edge of the names
+  static constexpr double kNotes = 560.0;  ///< left edge of the notes
+  static constexpr double kRow = 22.0;
+  static constexpr double kFoot = 48.0;
+  static constexpr const char* kLow = kColors[0];
+  static constexpr const char* kHigh = kColors[1];
+
+  template <class... Args>
+  void append(fmt::format_string<Args...> text, Args&&... args) {
+    fmt::format_to(std::back_inserter(out_), text, std::forward<Args>(args)...);
+    out_ += '\n';
+  }
+  void write_legend(double x, const char* ink, const char* text) {
+    append(R"(<rect x="{}" y="{}" width="10" height="10" fill="{}"/>)", x, kTop - 6.0, ink);
+    append(R"(<text x="{}" y="{}">{}</text>)", x + 16.0, kTop + 3.0, text);
+  }
+  void write_bar(double value, double y, const char* ink, const std::string& title) {
+    const double from = x_.px(std::min(0.0, value));
+    const double to = x_.px(std::max(0.0, value));
+    append(
+        R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{}" fill="{}" fill-opacity="0.8"><title>{}</title></rect>)",
+        from, y + 4.0, to - from, kRow - 8.0, ink, escaped(title));
+  }
+
+  const Tornado& tornado_;
+  double height_;
+  std::string& out_;
+  Scale x_;
+};
+
+/// Begins a document of a size in pixels.
+std::string begin_document(double width, double height) {
+  return fmt::format(
       R"(<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {0} {1}" width="{0}" height="{1}">
 <style>
 text {{ font: 12px sans-serif; fill: #222; }}
@@ -321,6 +394,50 @@ text {{ font: 12px sans-serif; fill: #222; }}
 <rect width="100%" height="100%" fill="#fff"/>
 )",
       width, height);
+}
+
+physics::Result<void> write_document(const std::filesystem::path& file,
+                                     const std::string& document) {
+  std::ofstream stream(file, std::ios::binary);
+  stream << document;
+  stream.flush();
+  if (!stream) {
+    return physics::make_error(physics::ErrorCode::io,
+                               fmt::format("{}: cannot be written", file.string()));
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string svg_document(const std::vector<Tornado>& tornados) {
+  double height = 0.0;
+  for (const Tornado& tornado : tornados) {
+    height = std::max(height, TornadoWriter::height_of(tornado));
+  }
+  const double width = TornadoWriter::kTornadoWidth;
+  std::string out = begin_document(width * static_cast<double>(tornados.size()), height);
+  for (std::size_t i = 0; i < tornados.size(); ++i) {
+    fmt::format_to(std::back_inserter(out), "<g transform=\"translate({} 0)\">\n",
+                   width * static_cast<double>(i));
+    TornadoWriter(tornados[i], TornadoWriter::height_of(tornados[i]), out).write();
+    out += "</g>\n";
+  }
+  out += "</svg>\n";
+  return out;
+}
+
+physics::Result<void> write_svg(const std::filesystem::path& file,
+                                const std::vector<Tornado>& tornados) {
+  return write_document(file, svg_document(tornados));
+}
+
+std::string svg_document(const std::vector<Plot>& plots, std::size_t columns) {
+  columns = std::clamp<std::size_t>(columns, 1, std::max<std::size_t>(1, plots.size()));
+  const std::size_t rows = (plots.size() + columns - 1) / columns;
+  const double width = kWidth * static_cast<double>(columns);
+  const double height = kHeight * static_cast<double>(std::max<std::size_t>(rows, 1));
+  std::string out = begin_document(width, height);
   for (std::size_t i = 0; i < plots.size(); ++i) {
     fmt::format_to(std::back_inserter(out), "<g transform=\"translate({} {})\">\n",
                    kWidth * static_cast<double>(i % columns),
@@ -334,14 +451,7 @@ text {{ font: 12px sans-serif; fill: #222; }}
 
 physics::Result<void> write_svg(const std::filesystem::path& file, const std::vector<Plot>& plots,
                                 std::size_t columns) {
-  std::ofstream stream(file, std::ios::binary);
-  stream << svg_document(plots, columns);
-  stream.flush();
-  if (!stream) {
-    return physics::make_error(physics::ErrorCode::io,
-                               fmt::format("{}: cannot be written", file.string()));
-  }
-  return {};
+  return write_document(file, svg_document(plots, columns));
 }
 
 }  // namespace emit::tool

@@ -49,6 +49,26 @@ struct Plot {
   std::vector<PlotSeries> series;
 };
 
+/// What an input does that is moved to both ends of its range.
+struct TornadoBar {
+  std::string label;     ///< of the input
+  std::string title;     ///< shown under the pointer; may be empty
+  double at_low = 0.0;   ///< shift with the input at its low end
+  double at_high = 0.0;  ///< and at its high end
+  std::string note;      ///< written at the right; may be empty
+};
+/// Bars below each other, from zero to both sides.
+struct Tornado {
+  std::string title;
+  std::string label;  ///< of the shifts, with the unit
+  std::vector<TornadoBar> bars;
+};
+/// Returns tornado plots side by side as one SVG document. Setup only; any thread.
+[[nodiscard]] std::string svg_document(const std::vector<Tornado>& tornados);
+/// Writes it. Errors: io, naming the file.
+[[nodiscard]] physics::Result<void> write_svg(const std::filesystem::path& file,
+                                              const std::vector<Tornado>& tornados);
+
 /// Returns diagrams side by side as one SVG document, `columns` in a row. Setup only; any thread.
 [[nodiscard]] std::string svg_document(const std::vector<Plot>& plots, std::size_t columns = 2);
 

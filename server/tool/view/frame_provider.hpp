@@ -45,7 +45,7 @@ struct ViewFrame {
   std::uint32_t flags = 0;
   double frame_ms = 0.0;  ///< time to make it, or pose to reception
 
-  // Of scenarios alone. Planes are NaN where there is sky; `material` has no meaning there.
+  // Only scenarios fill these. Planes are NaN where there is sky; `material` has no meaning there.
   physics::Pose sensor_pose;
   std::vector<float> material;  ///< index into `material_names`
   std::vector<float> sun_cosine;

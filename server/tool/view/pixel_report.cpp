@@ -30,8 +30,8 @@ std::vector<std::string> pixel_report(const scene::ScenarioDesc& scenario,
                                 static_cast<double>(frame.depth_m[i]) / ray.x));
     lines.push_back(fmt::format("object {}  material {}", object.name,
                                 finder.material_name(static_cast<std::size_t>(frame.material[i]))));
-    lines.push_back(fmt::format("surface {:.2f} K  sun {:.2f}  sky {:.2f}",
-                                frame.temperature_k[i], frame.sun_cosine[i], frame.sky_frac[i]));
+    lines.push_back(fmt::format("surface {:.2f} K  sun {:.2f}  sky {:.2f}", frame.temperature_k[i],
+                                frame.sun_cosine[i], frame.sky_frac[i]));
   } else {
     lines.push_back(fmt::format("pixel {} {}  sky", px.x, px.y));
   }
@@ -48,8 +48,8 @@ std::vector<std::string> pixel_report(const scene::ScenarioDesc& scenario,
     lines.push_back(fmt::format("{} {:.4g}  {:.1f} %", name, value_w_m2_sr,
                                 100.0 * value_w_m2_sr / radiance_w_m2_sr));
   }
-  lines.push_back(fmt::format("sum {:.6g}  pixel {:.6g} W/m2/sr", terms[band].sum_w_m2_sr(),
-                              radiance_w_m2_sr));
+  lines.push_back(
+      fmt::format("sum {:.6g}  pixel {:.6g} W/m2/sr", terms[band].sum_w_m2_sr(), radiance_w_m2_sr));
   return lines;
 }
 

@@ -22,8 +22,8 @@ constexpr image::Rgb kInk{215, 215, 215};
 void fill_column(image::RgbImage& picture, std::uint32_t x, std::uint32_t first_y,
                  const image::Rgb& color) {
   for (std::uint32_t y = first_y; y < picture.height_px; ++y) {
-    std::ranges::copy(color, picture.rgb.begin() +
-                                 3 * (static_cast<std::ptrdiff_t>(y) * picture.width_px + x));
+    std::ranges::copy(
+        color, picture.rgb.begin() + 3 * (static_cast<std::ptrdiff_t>(y) * picture.width_px + x));
   }
 }
 

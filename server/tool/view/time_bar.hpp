@@ -11,7 +11,8 @@ namespace emit::tool::view {
 inline constexpr std::uint32_t kTimeBarPx = 16;
 inline constexpr double kDayH = 24.0;
 
-/// Returns the local solar time of an instant, 0..24 h: UTC and four minutes per degree of longitude.
+/// Returns the local solar time of an instant, 0..24 h: UTC and four minutes per degree of
+/// longitude.
 [[nodiscard]] double solar_hour(std::int64_t epoch_utc_ns, std::int64_t sim_time_ns,
                                 double longitude_rad) noexcept;
 

@@ -35,7 +35,8 @@ void paint_materials(const ViewFrame& frame, const PictureOptions& options,
   const std::vector<float>& values = quantity_of(frame, options.show_radiance);
   for (std::size_t i = 0; i < frame.material.size(); ++i) {
     if (std::isnan(frame.sky_frac[i])) continue;
-    const double frac = (static_cast<double>(values[i]) - options.low) / (options.high - options.low);
+    const double frac =
+        (static_cast<double>(values[i]) - options.low) / (options.high - options.low);
     set_pixel(picture, i % frame.width_px, i / frame.width_px,
               material_color(static_cast<std::size_t>(frame.material[i]),
                              std::isnan(frac) ? 0.0 : std::clamp(frac, 0.0, 1.0)));
@@ -56,7 +57,9 @@ bool same_view(const ViewFrame& frame, const image::FrameMetadata& reference) {
 
 }  // namespace
 
-const char* name_of(Overlay overlay) noexcept { return kNames[static_cast<std::size_t>(overlay)]; }
+const char* name_of(Overlay overlay) noexcept {
+  return kNames[static_cast<std::size_t>(overlay)];
+}
 
 std::optional<Overlay> overlay_of(std::string_view name) noexcept {
   const auto found = std::ranges::find(kNames, name);
@@ -86,17 +89,17 @@ Result<ReferencePicture> read_reference(const std::filesystem::path& file,
 Result<PictureError> picture_error(const ViewFrame& frame, const ReferencePicture& reference,
                                    bool show_radiance) {
   if (frame.width_px != reference.width_px || frame.height_px != reference.height_px) {
-    return make_error(ErrorCode::invalid_argument,
-                      fmt::format("the reference has {}x{} pixels, the view {}x{}",
-                                  reference.width_px, reference.height_px, frame.width_px,
-                                  frame.height_px));
+    return make_error(
+        ErrorCode::invalid_argument,
+        fmt::format("the reference has {}x{} pixels, the view {}x{}", reference.width_px,
+                    reference.height_px, frame.width_px, frame.height_px));
   }
   const std::vector<float>& truth =
       show_radiance ? reference.radiance_w_m2_sr : reference.temperature_k;
   if (truth.empty()) {
     return make_error(ErrorCode::invalid_argument,
-                      fmt::format("the reference has no {}", show_radiance ? "radiance of the band"
-                                                                           : "temperature"));
+                      fmt::format("the reference has no {}",
+                                  show_radiance ? "radiance of the band" : "temperature"));
   }
   const std::vector<float>& values = quantity_of(frame, show_radiance);
   PictureError out;

@@ -77,18 +77,18 @@ TEST_F(ViewScenario, frames_hold_what_the_overlays_show) {
   }
   // The levels are those of the renderer's ladder, and a number too high is the last one.
   control_.quality_level = 2;
-  EXPECT_EQ(frame_where([](const ViewFrame& frame) { return frame.quality_level > 0; }).quality_level,
-            2);
+  EXPECT_EQ(
+      frame_where([](const ViewFrame& frame) { return frame.quality_level > 0; }).quality_level, 2);
   control_.quality_level = 255;
-  EXPECT_LT(frame_where([](const ViewFrame& frame) { return frame.quality_level > 2; }).quality_level,
-            255);
+  EXPECT_LT(
+      frame_where([](const ViewFrame& frame) { return frame.quality_level > 2; }).quality_level,
+      255);
 }
 
 TEST_F(ViewScenario, a_report_is_that_of_emit_explain) {
   control_.quality_level = 1;  // the report takes a frame of full quality all the same
   control_.report_px = {40, 40};
-  const ViewFrame frame =
-      frame_where([](const ViewFrame& each) { return each.report != nullptr; });
+  const ViewFrame frame = frame_where([](const ViewFrame& each) { return each.report != nullptr; });
   ASSERT_TRUE(frame.report);
   std::string lines;
   for (const std::string& line : *frame.report) lines += line + "\n";

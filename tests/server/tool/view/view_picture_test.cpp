@@ -45,8 +45,7 @@ image::Rgb pixel(const image::RgbImage& picture, std::uint32_t x, std::uint32_t 
 
 image::RgbImage drawn(const ViewFrame& frame, Overlay overlay, const PictureError* error = nullptr,
                       double low = 300.0, double high = 308.0) {
-  auto picture = draw_picture(
-      frame, {.overlay = overlay, .low = low, .high = high}, error);
+  auto picture = draw_picture(frame, {.overlay = overlay, .low = low, .high = high}, error);
   EXPECT_TRUE(picture) << (picture ? "" : picture.error().text);
   return picture ? std::move(*picture) : image::RgbImage{};
 }
