@@ -28,6 +28,9 @@ physics::Result<RadiancePass> RadiancePass::create(const scene::ThermalOptions& 
   if (content.first_lobe != 0) {
     defines.push_back({"EMIT_LOBES", fmt::format("{}", content.first_lobe)});
   }
+  if (content.air_sun != 0) {
+    defines.push_back({"EMIT_AIR_SUN", fmt::format("{}u", content.air_sun)});
+  }
   if (content.clutter) defines.push_back({"EMIT_CLUTTER", "1"});
   if (content.clutter_emissivity) defines.push_back({"EMIT_CLUTTER_EMISSIVITY", "1"});
   if (options.model == scene::ThermalModel::foster) defines.push_back({"EMIT_FOSTER", "1"});

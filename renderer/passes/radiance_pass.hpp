@@ -15,6 +15,7 @@ struct RadianceContent {
   std::uint32_t air_terms = 0;  ///< bit per band: its air is a sum of exponential terms
   std::uint32_t air_table = 0;  ///< bit per band: its air is a table
   std::uint32_t air_model = 0;  ///< bit per band: its air is built in
+  std::uint32_t air_sun = 0;    ///< bit per band: this air may scatter sunlight
   std::uint32_t terms = 0;      ///< largest number of exponential terms of a band
   /// Index of the first number of the lobes in the buffer of the tables; 0: nothing is glossy.
   std::uint32_t first_lobe = 0;

@@ -259,6 +259,7 @@ RadianceContent radiance_content(const BandModel& bands, const ClutterFields& cl
           .air_terms = bands.air_terms(),
           .air_table = bands.air_table(),
           .air_model = bands.air_model(),
+          .air_sun = bands.air_sun(),
           .terms = bands.max_terms(),
           .first_lobe = bands.first_lobe(),
           .outputs = (output.temperature ? EMIT_OUTPUT_TEMPERATURE : 0U) |
@@ -564,6 +565,7 @@ std::vector<RadianceTerms> GlRenderer::radiance_terms(const FrameView& view, con
   seen.normal = {view.normal[0][i], view.normal[1][i], view.normal[2][i]};
   seen.to_viewer = -glm::normalize(glm::mat3(frame_params_.relworld_from_sensor) * ray);
   seen.to_sun = frame_params_.to_sun;
+  seen.ray_sun_cosine = -glm::dot(seen.to_sun, seen.to_viewer);
   seen.glint_per_sr = view.glint_per_sr[i];
   seen.clutter_sd = view.clutter_sd[i];
   seen.clutter_variance_k2 = view.clutter_variance_k2[i];
@@ -580,10 +582,10 @@ std::vector<RadianceTerms> GlRenderer::radiance_terms(const FrameView& view, con
     RadianceTerms& terms = out[b];
     terms.gas_frac = gas.through_frac[b];
     terms.gas_w_m2_sr = gas.added_w_m2_sr[b];
-    for (double* part :
-         {&terms.emission_w_m2_sr, &terms.sky_w_m2_sr, &terms.neighbours_w_m2_sr,
-          &terms.sun_w_m2_sr, &terms.lobe_sky_w_m2_sr, &terms.lobe_neighbours_w_m2_sr,
-          &terms.glint_w_m2_sr, &terms.path_w_m2_sr, &terms.bodies_w_m2_sr}) {
+    for (double* part : {&terms.emission_w_m2_sr, &terms.sky_w_m2_sr, &terms.neighbours_w_m2_sr,
+                         &terms.sun_w_m2_sr, &terms.lobe_sky_w_m2_sr,
+                         &terms.lobe_neighbours_w_m2_sr, &terms.glint_w_m2_sr, &terms.path_w_m2_sr,
+                         &terms.scattered_w_m2_sr, &terms.bodies_w_m2_sr}) {
       *part *= terms.gas_frac;
     }
   }
@@ -593,7 +595,7 @@ std::vector<RadianceTerms> GlRenderer::radiance_terms(const FrameView& view, con
 void GlRenderer::upload_frame() noexcept {
   frame_buffer_.upload(std::span<const gpu::FrameParams>(&frame_params_, 1));
   band_buffer_.upload(bands_.params());
-  if (bands_.air_nodes_change()) air_buffer_.upload(bands_.air_nodes());
+  if (bands_.air_nodes_change()) air_buffer_.upload(bands_.air_nodes_now());
   if (passes_.targets) passes_.targets->upload();
   if (passes_.gas) passes_.gas->upload();
   stage_->upload();

@@ -87,6 +87,7 @@ physics::Result<void> BandModel::build_views(const scene::ScenarioDesc& scenario
     }
     std::vector<std::size_t> members;
     std::vector<physics::BandAir> bands;
+    std::vector<std::optional<physics::SunScatter>> scatters;
     for (std::size_t i = first; i < entries_.size(); ++i) {
       if ((air_model_ >> i & 1U) == 0) continue;
       if (*atmosphere_of(scenario, scenario.bands[i].name)->model != spec) continue;
@@ -97,9 +98,12 @@ physics::Result<void> BandModel::build_views(const scene::ScenarioDesc& scenario
       }
       members.push_back(i);
       bands.push_back(std::move(*band));
+      scatters.push_back(physics::SunScatter::build(*column, entries_[i].band));
     }
     std::vector<physics::AirView::Subject> subjects;
-    for (const physics::BandAir& band : bands) subjects.push_back({&band});
+    for (std::size_t k = 0; k < members.size(); ++k) {
+      subjects.push_back({.band = &bands[k], .scatter = scatters[k] ? &*scatters[k] : nullptr});
+    }
     std::vector<physics::AirView> views = physics::AirView::build(*column, subjects);
     for (std::size_t k = 0; k < members.size(); ++k) {
       Entry& entry = entries_[members[k]];
@@ -110,6 +114,15 @@ physics::Result<void> BandModel::build_views(const scene::ScenarioDesc& scenario
     }
   }
   if (air_nodes_.empty()) air_nodes_.resize(1);
+  // The tables of scattered sunlight come last, because no night needs them.
+  first_sun_node_ = air_nodes_.size();
+  sun_nodes_.assign(entries_.size(), 0);
+  for (std::size_t i = 0; i < entries_.size(); ++i) {
+    if (!entries_[i].view || !entries_[i].view->scatters()) continue;
+    air_sun_ |= 1U << i;
+    sun_nodes_[i] = air_nodes_.size();
+    air_nodes_.resize(air_nodes_.size() + physics::AirView::kSunNodes);
+  }
   return {};
 }
 
@@ -288,6 +301,11 @@ void BandModel::light_of(const Entry& entry, const Instant& now, BandLight& out)
   if (entry.view) {
     clear_w_m2_sr = entry.view->clear_sky_by_tilt_w_m2_sr(place_m_, sky_warmer_k(entry, now));
     sun_transmittance_frac = entry.view->sun_transmittance_frac(place_m_, now.sin_shown);
+    if (entry.view->scatters() && now.beam_frac > 0.0) {
+      const double share = now.beam_frac / (now.distance_au * now.distance_au);
+      const auto scattered = entry.view->scattered_sky_by_tilt_w_m2_sr(place_m_, now.sin_shown);
+      for (std::size_t t = 0; t < physics::kSkyTilts; ++t) clear_w_m2_sr[t] += share * scattered[t];
+    }
   } else if (entry.air) {
     clear_w_m2_sr = entry.air_sky_w_m2_sr;
     sun_transmittance_frac = entry.air->out(now.sin_sun).transmittance_frac;
@@ -313,6 +331,33 @@ void BandModel::light_at(const physics::Forcing& forcing, const physics::SunPosi
   for (std::size_t i = 0; i < entries_.size(); ++i) light_of(entries_[i], now, out[i]);
 }
 
+double BandModel::shown_beam_frac(const Instant& now, double sensor_m) const noexcept {
+  if (sensor_m < place_m_ + now.sky.cloud_base_m) return now.beam_frac;
+  return now.cloud_frac < 1.0 && now.beam_frac > 0.0 ? now.beam_frac / (1.0 - now.cloud_frac) : 1.0;
+}
+
+void BandModel::update_scattered(const Entry& entry, const Instant& now, double sensor_m,
+                                 std::size_t band) noexcept {
+  params_[band].air_sun_first = 0;
+  if (!entry.view->scatters() || !(now.sin_shown > 0.0)) return;
+  const double beam_frac = shown_beam_frac(now, sensor_m);
+  if (!(now.air_mass > 0.0 && beam_frac > 0.0)) return;
+  sunlit_ = true;
+  params_[band].air_sun_first = static_cast<std::uint32_t>(sun_nodes_[band]);
+  entry.view->sun_at(sensor_m,
+                     {.sin_elevation = now.sin_shown,
+                      .share_frac = beam_frac / (now.distance_au * now.distance_au),
+                      .cloud_cover_frac = now.sky.cloud_cover_frac,
+                      .cloud_base_m = place_m_ + now.sky.cloud_base_m},
+                     std::span(air_nodes_).subspan(sun_nodes_[band], physics::AirView::kSunNodes));
+}
+
+std::span<const physics::AirView::Node> BandModel::sun_nodes_of(std::size_t band) const noexcept {
+  return std::span(air_nodes_)
+      .subspan(sun_nodes_[band],
+               params_[band].air_sun_first != 0 ? physics::AirView::kSunNodes : 0);
+}
+
 void BandModel::update_bodies(const Entry& entry, const Instant& now,
                               const physics::MoonPosition& moon, double sensor_m,
                               gpu::BandParams& params) const noexcept {
@@ -326,10 +371,7 @@ void BandModel::update_bodies(const Entry& entry, const Instant& now,
   };
   const bool above_clouds = sensor_m >= place_m_ + now.sky.cloud_base_m;
   const double cover_frac = entry.has_sky && !above_clouds ? now.sky.cloud_cover_frac : 0.0;
-  const double beam_frac = !above_clouds ? now.beam_frac
-                           : now.cloud_frac < 1.0 && now.beam_frac > 0.0
-                               ? now.beam_frac / (1.0 - now.cloud_frac)
-                               : 1.0;
+  const double beam_frac = shown_beam_frac(now, sensor_m);
   const double sine = std::sin(physics::kSunSemiAngleRad);
   params.sun_disc_w_m2_sr =
       static_cast<float>(entry.sun_outside_w_m2 * beam_frac * through({0.0, 0.0, now.sin_sun}) /
@@ -343,6 +385,7 @@ void BandModel::update_bodies(const Entry& entry, const Instant& now,
 void BandModel::update(const physics::Forcing& forcing, const physics::SunPosition& sun,
                        const physics::MoonPosition& moon, double sensor_m) noexcept {
   const Instant now = instant_of(forcing, sun);
+  sunlit_ = false;
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     const Entry& entry = entries_[i];
     gpu::BandParams& params = params_[i];
@@ -374,6 +417,7 @@ void BandModel::update(const physics::Forcing& forcing, const physics::SunPositi
                     .cloud_base_m = place_m_ + now.sky.cloud_base_m,
                     .cloud_radiance_w_m2_sr = cloud_w_m2_sr},
                    std::span(air_nodes_).subspan(params.air_view_first, physics::AirView::kNodes));
+    update_scattered(entry, now, sensor_m, i);
   }
 }
 
@@ -392,6 +436,10 @@ void BandModel::update_lobe_sky(std::size_t band, const Instant& now) noexcept {
     double clear_w_m2_sr = 0.0;
     if (entry.view) {
       clear_w_m2_sr = entry.view->clear_sky_w_m2_sr(place_m_, warmer_k, sine);
+      if (entry.view->scatters() && now.beam_frac > 0.0) {
+        clear_w_m2_sr += now.beam_frac / (now.distance_au * now.distance_au) *
+                         entry.view->scattered_sky_w_m2_sr(place_m_, now.sin_shown, sine);
+      }
     } else if (entry.air) {
       clear_w_m2_sr = entry.air->out(sine).path_radiance_w_m2_sr;
     } else if (entry.has_sky) {
@@ -433,6 +481,15 @@ BandModel::AirWay BandModel::air_way(std::size_t band, const Sight& sight,
     out.air_frac = air_transmittance(nodes, sight, temperature_k);
     out.air_sun_frac = std::exp(-std::exp(node[2]) * sight.range_m);
     out.path_w_m2_sr = physics::air_path_w_m2_sr(node, sight.range_m);
+    const auto sun_nodes = sun_nodes_of(band);
+    if (!sun_nodes.empty()) {
+      // The light is tabulated as the thermal radiance is, by 1 - tau.
+      auto scattered = node;
+      scattered[3] =
+          physics::air_sun_w_m2_sr(physics::air_sight_node(sun_nodes, target_m, sight.range_m),
+                                   physics::air_sun_phase(sun_nodes, sight.ray_sun_cosine));
+      out.scattered_w_m2_sr = physics::air_path_w_m2_sr(scattered, sight.range_m);
+    }
   } else if (entry.air) {
     const auto air = entry.air->along(sight.range_m, sight.sin_elevation);
     out.air_frac = out.air_sun_frac = air.transmittance_frac;
@@ -461,6 +518,12 @@ RadianceTerms BandModel::terms(std::size_t band, const Seen& seen,
     if (entry.view) {
       const physics::AirSight sky = physics::air_sky(air_nodes_of(band), seen.sin_elevation);
       out.path_w_m2_sr = sky.path_radiance_w_m2_sr;
+      const auto sun_nodes = sun_nodes_of(band);
+      if (!sun_nodes.empty()) {
+        out.scattered_w_m2_sr =
+            physics::air_sun_w_m2_sr(physics::air_sky_node(sun_nodes, seen.sin_elevation),
+                                     physics::air_sun_phase(sun_nodes, seen.ray_sun_cosine));
+      }
       moon_through_frac *= sky.transmittance_frac[0];
       sun_through_frac = sky.transmittance_frac[2];
     } else if (entry.air) {
@@ -489,10 +552,12 @@ RadianceTerms BandModel::terms(std::size_t band, const Seen& seen,
   }
   // Find what the air lets through and what it adds.
   const AirWay way =
-      air_way(band, {seen.range_m, seen.sin_elevation, seen.sensor_height_m}, seen.temperature_k);
+      air_way(band, {seen.range_m, seen.sin_elevation, seen.sensor_height_m, seen.ray_sun_cosine},
+              seen.temperature_k);
   out.air_frac = way.air_frac;
   out.air_sun_frac = way.air_sun_frac;
   out.path_w_m2_sr = way.path_w_m2_sr;
+  out.scattered_w_m2_sr = way.scattered_w_m2_sr;
   // Split what leaves the surface.
   out.emissivity_frac = emissivity_frac(seen.material, band);
   float emitting_k = seen.temperature_k;

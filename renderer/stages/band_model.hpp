@@ -50,15 +50,17 @@ class BandModel final : public BandLights {
 
   /// Air between the camera and a point, by band.
   struct AirWay {
-    double air_frac = 1.0;      ///< transmittance for what a source at the temperature emits
-    double air_sun_frac = 1.0;  ///< transmittance for reflected sunlight
-    double path_w_m2_sr = 0.0;
+    double air_frac = 1.0;           ///< transmittance for what a source at the temperature emits
+    double air_sun_frac = 1.0;       ///< transmittance for reflected sunlight
+    double path_w_m2_sr = 0.0;       ///< thermal
+    double scattered_w_m2_sr = 0.0;  ///< sunlight
   };
   /// Line of sight to a point.
   struct Sight {
     float range_m = 0.0F;
     float sin_elevation = 0.0F;
     float sensor_height_m = 0.0F;  ///< above sea level
+    float ray_sun_cosine = 0.0F;   ///< of the angle to the sun
   };
   /// Returns the air on a line of sight to a source of a temperature, at the instant of update().
   [[nodiscard]] AirWay air_way(std::size_t band, const Sight& sight,
@@ -75,6 +77,7 @@ class BandModel final : public BandLights {
     float range_m = 0.0F;
     float sin_elevation = 0.0F;    ///< of the line of sight
     float sensor_height_m = 0.0F;  ///< above sea level
+    float ray_sun_cosine = 0.0F;   ///< of the angle between the line of sight and the sun
     SkyBodies bodies;              ///< of a pixel of the sky
     // Glossy surfaces only: unit vectors, relworld, and FrameView::glint_per_sr.
     glm::vec3 normal{0.0F, 0.0F, 1.0F};
@@ -100,11 +103,17 @@ class BandModel final : public BandLights {
   [[nodiscard]] std::uint32_t air_terms() const noexcept { return air_terms_; }
   /// Bits of the bands with built-in air.
   [[nodiscard]] std::uint32_t air_model() const noexcept { return air_model_; }
+  /// Bits of the bands whose built-in air may scatter sunlight.
+  [[nodiscard]] std::uint32_t air_sun() const noexcept { return air_sun_; }
   /// The sky as lobes see it, if there are glossy materials (lib/lobe.glsl), then tables of the
-  /// built-in air for the camera of the frame, one behind the other (lib/air_view.glsl). One node
-  /// without either.
+  /// built-in air for the camera of the frame, one behind the other (lib/air_view.glsl), then
+  /// those of the sunlight that it scatters. One node without either.
   [[nodiscard]] std::span<const physics::AirView::Node> air_nodes() const noexcept {
     return air_nodes_;
+  }
+  /// The part of air_nodes() that the frame needs: by night it ends before the scattered sunlight.
+  [[nodiscard]] std::span<const physics::AirView::Node> air_nodes_now() const noexcept {
+    return std::span(air_nodes_).first(sunlit_ ? air_nodes_.size() : first_sun_node_);
   }
   /// Bits of the bands whose air is a table.
   [[nodiscard]] std::uint32_t air_table() const noexcept { return air_table_; }
@@ -137,6 +146,9 @@ class BandModel final : public BandLights {
     double sun_outside_w_m2 = 0;  ///< in band, normal to the sun, at 1 au
     bool has_sky = false;         ///< false: a band without air shows no sky
   };
+  /// Table of the sunlight that the air of a band scatters; empty where there is none.
+  [[nodiscard]] std::span<const physics::AirView::Node> sun_nodes_of(
+      std::size_t band) const noexcept;
   /// Table of the built-in air of a band; empty for other air.
   [[nodiscard]] std::span<const physics::AirView::Node> air_nodes_of(
       std::size_t band) const noexcept;
@@ -159,6 +171,11 @@ class BandModel final : public BandLights {
   /// Air of the place against that of the climate at sea level; 0 without built-in air.
   [[nodiscard]] double warmer_k(const Entry& entry, const Instant& now) const noexcept;
   [[nodiscard]] double sky_warmer_k(const Entry& entry, const Instant& now) const noexcept;
+  /// Direct sun over that of a clear sky, as a camera at a height sees it.
+  [[nodiscard]] double shown_beam_frac(const Instant& now, double sensor_m) const noexcept;
+  /// Sets the sunlight that the air of a band scatters towards the camera.
+  void update_scattered(const Entry& entry, const Instant& now, double sensor_m,
+                        std::size_t band) noexcept;
   /// Sets the radiance of the discs of sun and moon in a band.
   void update_bodies(const Entry& entry, const Instant& now, const physics::MoonPosition& moon,
                      double sensor_m, gpu::BandParams& params) const noexcept;
@@ -170,11 +187,15 @@ class BandModel final : public BandLights {
   std::vector<float> tables_;
   std::uint32_t nodes_per_band_ = 0;
   std::vector<physics::AirView::Node> air_nodes_;
-  double place_m_ = 0.0;  ///< height of the world's origin above sea level
+  std::size_t first_sun_node_ = 0;      ///< of air_nodes_: scattered sunlight begins there
+  std::vector<std::size_t> sun_nodes_;  ///< by band: first node, or 0
+  bool sunlit_ = false;                 ///< some band has scattered sunlight now
+  double place_m_ = 0.0;                ///< height of the world's origin above sea level
   double turbidity_ = 0.0;
   double dew_point_k_ = 0.0;
   physics::CloudBase cloud_base_;
   std::uint32_t air_model_ = 0;
+  std::uint32_t air_sun_ = 0;
   std::uint32_t air_terms_ = 0;
   std::uint32_t air_table_ = 0;
   std::uint32_t max_terms_ = 0;

@@ -280,6 +280,7 @@ void GasModel::update(const View& view, const physics::Forcing& forcing,
                       const gpu::FrameParams& frame) noexcept {
   count_ = 0;
   forcing_ = forcing;
+  to_sun_ = frame.to_sun;
   const glm::dvec2 tan_per_px =
       glm::dvec2(frame.ray_per_px) * glm::dvec2(frame.rendered_px) / glm::dvec2(frame.output_px);
   px_per_tan_ = 1.0 / tan_per_px;
@@ -579,7 +580,9 @@ void GasModel::add(const Puff& puff, const View& view, const BandModel& bands,
   const BandModel::Sight sight{
       .range_m = static_cast<float>(range_m),
       .sin_elevation = static_cast<float>(range_m > 0.0 ? from_camera_m.z / range_m : 0.0),
-      .sensor_height_m = static_cast<float>(view.sensor_height_m)};
+      .sensor_height_m = static_cast<float>(view.sensor_height_m),
+      .ray_sun_cosine = static_cast<float>(
+          range_m > 0.0 ? glm::dot(from_camera_m, glm::dvec3(to_sun_)) / range_m : 0.0)};
   const auto kelvin = static_cast<float>(puff.kelvin);
   double deepest = 0.0;
   for (std::size_t b = 0; b < band_names_.size(); ++b) {
@@ -594,8 +597,9 @@ void GasModel::add(const Puff& puff, const View& view, const BandModel& bands,
           std::min(1.0, air_transmittance(own.nodes, sight, kelvin) / way.air_frac));
     }
     out.source_w_m2_sr[k] = static_cast<float>(
-        puff.flare ? narrow_frac[0] * narrow_frac[1] * puff.source_w_m2_sr[b] * way.air_frac
-                   : puff.source_w_m2_sr[b] * way.air_frac + way.path_w_m2_sr);
+        puff.flare
+            ? narrow_frac[0] * narrow_frac[1] * puff.source_w_m2_sr[b] * way.air_frac
+            : puff.source_w_m2_sr[b] * way.air_frac + way.path_w_m2_sr + way.scattered_w_m2_sr);
     for (std::size_t t = 0; t < physics::kGasTerms; ++t) {
       double depth =
           kRootTwoPi * line_m * (puff.gas_per_m[b] * spectra_[b].depth()[t] + puff.grey_per_m[b]);

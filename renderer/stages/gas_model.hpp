@@ -131,6 +131,7 @@ class GasModel {
   double place_m_ = 0.0;
   std::int64_t start_ns_ = 0;  ///< of the history: what was on before it has been on since then
   physics::Forcing forcing_;
+  glm::vec3 to_sun_{0.0F, 0.0F, 1.0F};  ///< relworld, at the instant of the frame
   glm::dvec2 px_per_tan_{1.0};
   glm::dvec2 px_at_axis_{0.0};
   std::array<gpu::GasPuff, EMIT_MAX_GAS_PUFFS> puffs_{};

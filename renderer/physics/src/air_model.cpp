@@ -82,26 +82,29 @@ constexpr double kUmPerCm = 1e4;
 constexpr double kEmissionFirstK = 150.0;
 constexpr double kEmissionStepK = 2.0;
 
-/// Integrals of a band's response over wavelength, um, and over wavenumber, cm-1.
-struct Response {
-  double over_um = 0.0;
-  double over_per_cm = 0.0;
-};
-Response integrate_response(const Band& band) {
+}  // namespace
+
+std::optional<Band> air_tables::part_of(const Band& band, const Piece& piece) {
+  Band part = band;
+  part.lo_um = std::max(band.lo_um, kUmPerCm / piece.to_per_cm);
+  part.hi_um = std::min(band.hi_um, kUmPerCm / piece.from_per_cm);
+  if (!validate(part)) return std::nullopt;  // the response is zero here
+  return part;
+}
+
+air_tables::Response air_tables::integrate_response(const Band& part) {
   // The midpoint rule suffices: a piece of the spectrum is narrow.
   constexpr int kPoints = 200;
-  const double step_um = (band.hi_um - band.lo_um) / kPoints;
+  const double step_um = (part.hi_um - part.lo_um) / kPoints;
   Response sum;
   for (int i = 0; i < kPoints; ++i) {
-    const double um = band.lo_um + (i + 0.5) * step_um;
-    const double response = response_frac(band, um);
+    const double um = part.lo_um + (i + 0.5) * step_um;
+    const double response = response_frac(part, um);
     sum.over_um += response * step_um;
     sum.over_per_cm += response * step_um * kUmPerCm / (um * um);
   }
   return sum;
 }
-
-}  // namespace
 
 std::optional<AirClimate> air_climate(std::string_view name) noexcept {
   const auto found = std::find(kClimateNames.begin(), kClimateNames.end(), name);
@@ -201,6 +204,9 @@ AirColumn::Point AirColumn::at(double height_m) const noexcept {
   const double f = (km - a.height_km) / (b.height_km - a.height_km);
   Point point;
   point.kelvin = a.kelvin + f * (b.kelvin - a.kelvin);
+  point.standard_air_frac =
+      std::exp(a.log_pressure_hpa + f * (b.log_pressure_hpa - a.log_pressure_hpa)) / 1013.25 *
+      (kZeroCelsiusK / point.kelvin);
   // Densities are exponential between levels, and linear where one of them is zero.
   for (std::size_t k = 0; k < kAirAbsorbers; ++k) {
     const double low = a.density_per_km[k];
@@ -239,6 +245,7 @@ void AirPath::add_step(const AirColumn& column, const std::array<double, 2>& hei
     for (std::size_t k = 0; k < kAirAbsorbers; ++k) {
       stretch.amount[k] += point.density_per_km[k] * length_km[i];
     }
+    stretch.standard_air_km += point.standard_air_frac * length_km[i];
     stretch.kelvin += point.kelvin * length_km[i];
     stretch.height_m += height_m[i] * length_km[i];
     open_weight_ += length_km[i];
@@ -380,14 +387,12 @@ void BandAir::add_term(const Term& term, Emission emission) {
 void BandAir::add_spectrum(const Band& band) {
   std::array<double, kAirSources> sum{};
   for (const air_tables::Piece& piece : air_tables::pieces()) {
-    Band part = band;
-    part.lo_um = std::max(band.lo_um, kUmPerCm / piece.to_per_cm);
-    part.hi_um = std::min(band.hi_um, kUmPerCm / piece.from_per_cm);
-    if (!validate(part)) continue;  // the response is zero here
+    const std::optional<Band> part = air_tables::part_of(band, piece);
+    if (!part) continue;
     // Find what each kind of source has in the piece.
-    const Response response = integrate_response(part);
+    const air_tables::Response response = air_tables::integrate_response(*part);
     const auto black = [&part](double kelvin) {
-      return band_radiance(part, Kelvin(kelvin)).radiance_w_m2_sr;
+      return band_radiance(*part, Kelvin(kelvin)).radiance_w_m2_sr;
     };
     const std::array<double, kAirSources> source{black(300.0), black(800.0),
                                                  black(kSunTemperatureK), response.over_um,

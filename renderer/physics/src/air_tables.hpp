@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <array>
+#include <optional>
 #include <span>
 #include <string_view>
 
@@ -50,5 +51,15 @@ struct Piece {
 };
 /// Returns the pieces in the order of wavenumber. They cover it without gaps.
 [[nodiscard]] std::span<const Piece> pieces() noexcept;
+/// Returns the part of a band that lies in a piece; empty where the response is zero there.
+[[nodiscard]] std::optional<Band> part_of(const Band& band, const Piece& piece);
+
+/// Integrals of a band's response over wavelength, um, and over wavenumber, cm-1.
+struct Response {
+  double over_um = 0.0;
+  double over_per_cm = 0.0;
+};
+/// Returns the integrals over a part of a band that is as narrow as a piece.
+[[nodiscard]] Response integrate_response(const Band& part);
 
 }  // namespace emit::physics::air_tables

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <optional>
 #include <thread>
 
 #include "emit/physics/check.hpp"
+#include "emit/physics/constants.hpp"
 
 namespace emit::physics {
 namespace {
@@ -38,6 +40,9 @@ double view_range_m(std::size_t i) {
                   static_cast<double>(i) / static_cast<double>(AirView::kRanges - 1));
 }
 
+/// Air is even over this range, m.
+constexpr double kEvenRangeM = 40.0;
+
 /// Smallest range of a line of sight whose ends lie in the cells around two nodes of height.
 double nearest_range_m(std::size_t sensor, std::size_t target) {
   const std::size_t low = std::min(sensor, target);
@@ -48,6 +53,12 @@ double nearest_range_m(std::size_t sensor, std::size_t target) {
 double view_elevation_rad(std::size_t i) {
   const double v = view_axis(i, AirView::kElevations, kFirstElevation, kLastElevation);
   return std::asin(std::clamp(AirView::kElevationScale * std::sinh(v), -1.0, 1.0));
+}
+
+/// Sine of the sun's elevation at a node.
+double view_sun_sine(std::size_t i) {
+  return std::min(
+      1.0, AirView::kElevationScale * std::sinh(view_axis(i, AirView::kSuns, 0.0, kLastElevation)));
 }
 
 /// ViewCell of a uniform axis and the fraction of it. NaN counts as the start of the axis.
@@ -75,7 +86,7 @@ ViewCell elevation_cell(float sin_elevation) noexcept {
 
 /// Shares of the sky's nodes in the means of sky_by_tilt().
 using SkyShares = std::array<SkyByTilt, AirView::kElevations>;
-SkyShares sky_shares() {
+SkyShares make_sky_shares() {
   SkyShares shares{};
   for (std::size_t e = 0; e < AirView::kElevations; ++e) {
     shares[e] = sky_by_tilt([e](double sine) {
@@ -86,11 +97,23 @@ SkyShares sky_shares() {
   }
   return shares;
 }
+const SkyShares& sky_shares() {
+  static const SkyShares kShares = make_sky_shares();
+  return kShares;
+}
 
 AirView::Node mix_nodes(const AirView::Node& a, const AirView::Node& b, float f) noexcept {
   AirView::Node out;
   for (std::size_t k = 0; k < out.size(); ++k) out[k] = a[k] + f * (b[k] - a[k]);
   return out;
+}
+
+/// Phase functions at the cosine of a scattering angle, from their nodes.
+AirView::Node phase_between(std::span<const AirView::Node> phases, float cosine) noexcept {
+  const float half_sine = std::sqrt(std::max(0.5F - 0.5F * cosine, 0.0F));
+  const ViewCell cell = view_cell(half_sine * static_cast<float>(SunScatter::kPhaseNodes - 1),
+                                  SunScatter::kPhaseNodes);
+  return mix_nodes(phases[cell.index], phases[cell.index + 1], cell.fraction);
 }
 
 /// Returns 1 - exp(-x) for x >= 0 without cancellation, as the shader does.
@@ -103,9 +126,28 @@ float view_opacity(float x) noexcept {
 std::vector<AirView> AirView::build(const AirColumn& column, std::span<const Subject> subjects) {
   constexpr double kLeast = 1e-30;
   std::vector<AirView> views(subjects.size());
-  for (AirView& view : views) view.slices_.resize(kHeights * kNodes);
+  // The sun stands at even steps of the sky's axis.
+  std::array<double, kSuns> suns_rad{};
+  for (std::size_t s = 0; s < kSuns; ++s) suns_rad[s] = std::asin(view_sun_sine(s));
+  std::vector<std::optional<SunScatter::Beams>> beams(subjects.size());
+  for (std::size_t v = 0; v < subjects.size(); ++v) {
+    views[v].slices_.resize(kHeights * kNodes);
+    if (subjects[v].scatter == nullptr) continue;
+    const SunScatter& scatter = *subjects[v].scatter;
+    beams[v] = scatter.beams(column, suns_rad);
+    views[v].scattered_.resize(kSuns * kHeights * kNodes);
+    for (std::size_t i = 0; i < SunScatter::kPhaseNodes; ++i) {
+      views[v].phases_.push_back(scatter.phase_node_per_sr(i));
+    }
+  }
+  // Light that the last longer path scattered, by subject.
+  struct Light {
+    std::array<SunScatter::Kinds, kSuns> by_sun{};
+    double range_m = 0.0;  ///< 0: none yet
+  };
   // Evaluate a path for all subjects. A range of 0 stands for the path to space.
-  const auto fill = [&](std::size_t node, const AirPath& path, double range_m) {
+  const auto fill = [&](std::size_t node, const AirPath& path, double range_m,
+                        std::span<Light> lights) {
     const bool sky = range_m == 0.0;
     for (std::size_t v = 0; v < subjects.size(); ++v) {
       const auto sight = subjects[v].band->evaluate(path, subjects[v].sources, kWarmerK);
@@ -121,25 +163,53 @@ std::vector<AirView> AirView::build(const AirColumn& column, std::span<const Sub
         slice.log_radiance[w] =
             static_cast<float>(std::log(std::max(sight.path_radiance_w_m2_sr[w] / opaque, kLeast)));
       }
+      if (!beams[v]) continue;
+      // A short path scatters in proportion to its length.
+      Light& light = lights[v];
+      const bool longer = sky || range_m > kEvenRangeM || light.range_m == 0.0;
+      if (longer) {
+        subjects[v].scatter->scattered_w_m2(path, *beams[v], light.by_sun);
+        light.range_m = range_m;
+      }
+      const double share = (longer ? 1.0 : range_m / light.range_m) / opaque;
+      for (std::size_t s = 0; s < kSuns; ++s) {
+        Node& out = views[v].scattered_[s * kHeights * kNodes + node];
+        for (std::size_t k = 0; k < out.size(); ++k) {
+          out[k] = static_cast<float>(share * light.by_sun[s][k]);
+        }
+      }
+    }
+  };
+  // Give a node what its neighbour has.
+  const auto copy = [&](std::size_t node, std::size_t from) {
+    for (AirView& view : views) {
+      view.slices_[node] = view.slices_[from];
+      for (std::size_t s = 0; s < kSuns && view.scatters(); ++s) {
+        const std::size_t first = s * kHeights * kNodes;
+        view.scattered_[first + node] = view.scattered_[first + from];
+      }
     }
   };
   const auto fill_sensor = [&](std::size_t sensor) {
     std::size_t node = sensor * kNodes;
     for (std::size_t target = 0; target < kHeights; ++target, node += kRanges) {
+      std::vector<Light> lights(subjects.size());
       const double nearest_m = nearest_range_m(sensor, target);
       for (std::size_t r = kRanges; r-- > 0;) {
         // No lookup comes between heights that are farther apart than the range.
         if (r + 1 < kRanges && view_range_m(r + 1) < nearest_m) {
-          for (AirView& view : views) view.slices_[node + r] = view.slices_[node + r + 1];
+          copy(node + r, node + r + 1);
           continue;
         }
         fill(node + r,
              AirPath::between(column, kHeightM[sensor], kHeightM[target], view_range_m(r)),
-             view_range_m(r));
+             view_range_m(r), lights);
       }
     }
+    std::vector<Light> lights(subjects.size());
     for (std::size_t e = 0; e < kElevations; ++e) {
-      fill(node + e, AirPath::to_space(column, kHeightM[sensor], view_elevation_rad(e)), 0.0);
+      fill(node + e, AirPath::to_space(column, kHeightM[sensor], view_elevation_rad(e)), 0.0,
+           lights);
     }
   };
   // Share the sensors' heights among the processors.
@@ -201,12 +271,102 @@ void AirView::at(double sensor_m, const Weather& weather, std::span<Node> out) c
   for (std::size_t i = kSky; i < kNodes; ++i) out[i][3] += cover * (cloud - out[i][3]);
 }
 
+struct AirView::SunPlace {
+  std::array<const Node*, 4> corner;  ///< first nodes: low sun, low and high sensor, then high sun
+  std::array<float, 4> share;
+};
+
+AirView::SunPlace AirView::sun_place_of(double sensor_m, double sin_sun) const noexcept {
+  const ViewCell sensor = view_cell(height_place(static_cast<float>(sensor_m)), kHeights);
+  const double place = std::asinh(std::max(sin_sun, 0.0) / kElevationScale) / kLastElevation;
+  const ViewCell sun = view_cell(static_cast<float>(place * (kSuns - 1)), kSuns);
+  SunPlace out;
+  for (std::size_t c = 0; c < 4; ++c) {
+    const bool high_sun = c >= 2;
+    const bool high_sensor = c % 2 == 1;
+    out.corner[c] = &scattered_[((sun.index + (high_sun ? 1 : 0)) * kHeights + sensor.index +
+                                 (high_sensor ? 1 : 0)) *
+                                kNodes];
+    out.share[c] = (high_sun ? sun.fraction : 1.0F - sun.fraction) *
+                   (high_sensor ? sensor.fraction : 1.0F - sensor.fraction);
+  }
+  return out;
+}
+
+AirView::Node AirView::scattered_at(const SunPlace& place, std::size_t node) noexcept {
+  Node out{};
+  for (std::size_t c = 0; c < 4; ++c) {
+    for (std::size_t k = 0; k < out.size(); ++k)
+      out[k] += place.share[c] * place.corner[c][node][k];
+  }
+  return out;
+}
+
+void AirView::sun_at(double sensor_m, const Sunlight& sun, std::span<Node> out) const noexcept {
+  EMIT_DCHECK(scatters() && out.size() == kSunNodes);
+  const SunPlace place = sun_place_of(sensor_m, sun.sin_elevation);
+  // Clouds hide their share of the sky behind them.
+  const double open_frac = sun.cloud_base_m <= sensor_m ? 1.0 : 1.0 - sun.cloud_cover_frac;
+  for (std::size_t i = 0; i < kNodes; ++i) {
+    out[i] = scattered_at(place, i);
+    const double share = sun.share_frac * (i < kHeights * kRanges ? 1.0 : open_frac);
+    for (float& x : out[i]) x *= static_cast<float>(share);
+  }
+  std::copy(phases_.begin(), phases_.end(), out.begin() + kNodes);
+}
+
+double AirView::scattered_around(const SunPlace& place, double sin_sun, double sin_elevation,
+                                 std::size_t node) const noexcept {
+  // Take more directions near the sun's azimuth, where the phase functions are steep.
+  constexpr int kAzimuths = 16;
+  const double across =
+      std::sqrt(std::max(0.0, (1.0 - sin_sun * sin_sun) * (1.0 - sin_elevation * sin_elevation)));
+  Node phase{};
+  for (int i = 0; i < kAzimuths; ++i) {
+    const double u = (i + 0.5) / kAzimuths;
+    const double cosine = sin_sun * sin_elevation + across * std::cos(kPi * u * u);
+    const Node one = phase_between(phases_, static_cast<float>(cosine));
+    for (std::size_t k = 0; k < phase.size(); ++k) {
+      phase[k] += static_cast<float>(2.0 * u / kAzimuths) * one[k];
+    }
+  }
+  return static_cast<double>(
+      air_sun_w_m2_sr(scattered_at(place, kHeights * kRanges + node), phase));
+}
+
+double AirView::scattered_sky_w_m2_sr(double height_m, double sin_sun,
+                                      double sin_elevation) const noexcept {
+  const SunPlace place = sun_place_of(height_m, sin_sun);
+  const ViewCell cell = elevation_cell(static_cast<float>(sin_elevation));
+  return std::lerp(scattered_around(place, sin_sun, sin_elevation, cell.index),
+                   scattered_around(place, sin_sun, sin_elevation, cell.index + 1),
+                   static_cast<double>(cell.fraction));
+}
+
+SkyByTilt AirView::scattered_sky_by_tilt_w_m2_sr(double height_m, double sin_sun) const noexcept {
+  const SkyShares& shares = sky_shares();
+  static const std::array<double, kElevations> kSines = [] {
+    std::array<double, kElevations> sines{};
+    for (std::size_t e = 0; e < kElevations; ++e) sines[e] = std::sin(view_elevation_rad(e));
+    return sines;
+  }();
+  const SunPlace place = sun_place_of(height_m, sin_sun);
+  SkyByTilt sum{};
+  for (std::size_t e = 0; e < kElevations; ++e) {
+    const SkyByTilt& share = shares[e];
+    if (share[kSkyTilts - 1] == 0.0 && share[0] == 0.0) continue;
+    const double radiance = scattered_around(place, sin_sun, kSines[e], e);
+    for (std::size_t t = 0; t < kSkyTilts; ++t) sum[t] += share[t] * radiance;
+  }
+  return sum;
+}
+
 SkyByTilt AirView::clear_sky_by_tilt_w_m2_sr(double height_m, double warmer_k) const noexcept {
-  static const SkyShares kShares = sky_shares();
+  const SkyShares& shares = sky_shares();
   const Place place = place_of(height_m, warmer_k);
   SkyByTilt sum{};
   for (std::size_t e = 0; e < kElevations; ++e) {
-    const SkyByTilt& share = kShares[e];
+    const SkyByTilt& share = shares[e];
     if (share[kSkyTilts - 1] == 0.0 && share[0] == 0.0) continue;
     const double radiance = radiance_at(place, kHeights * kRanges + e);
     for (std::size_t t = 0; t < kSkyTilts; ++t) sum[t] += share[t] * radiance;
@@ -262,10 +422,18 @@ AirSight air_sight(std::span<const AirView::Node> table, float target_m, float r
   return out;
 }
 
-AirSight air_sky(std::span<const AirView::Node> table, float sin_elevation) noexcept {
+AirView::Node air_sky_node(std::span<const AirView::Node> table, float sin_elevation) noexcept {
   const ViewCell place = elevation_cell(sin_elevation);
   const std::size_t i = AirView::kHeights * AirView::kRanges + place.index;
-  const AirView::Node node = mix_nodes(table[i], table[i + 1], place.fraction);
+  return mix_nodes(table[i], table[i + 1], place.fraction);
+}
+
+AirView::Node air_sun_phase(std::span<const AirView::Node> sun_table, float cosine) noexcept {
+  return phase_between(sun_table.subspan(AirView::kNodes), cosine);
+}
+
+AirSight air_sky(std::span<const AirView::Node> table, float sin_elevation) noexcept {
+  const AirView::Node node = air_sky_node(table, sin_elevation);
   AirSight out;
   for (std::size_t k = 0; k < 3; ++k) out.transmittance_frac[k] = std::exp(-node[k]);
   out.path_radiance_w_m2_sr = node[3];

@@ -405,6 +405,10 @@ std::size_t CsvTable::line_of(std::size_t row) const {
   return lines_[row];
 }
 
+bool CsvTable::has(std::string_view column) const noexcept {
+  return std::find(columns_.begin(), columns_.end(), column) != columns_.end();
+}
+
 Result<std::size_t> CsvTable::find(std::string_view column) const {
   return find_column(columns_, column, fmt::format("{}:{}", name_, header_line_),
                      ErrorCode::invalid_argument);

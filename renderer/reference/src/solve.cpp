@@ -411,10 +411,10 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
   const physics::SkyState sky_now = sky_by_bisection(now.longwave_down_w_m2, now.air_k, dew_point_k,
                                                      cloud_frac, scenario.clear_sky.cloud_base);
   const double sensor_m = view.sensor_pose.position_world_m.z;
-  SkyDiscs discs{sun, physics::moon_position(scenario.epoch_utc_ns + view.sim_time_ns, place),
-                 beam_frac};
   // Above the clouds the sun is that of a clear sky.
-  if (sensor_m >= sky_now.cloud_base_m && cloud_frac < 1.0) discs.beam_frac /= 1.0 - cloud_frac;
+  const double beam_above_frac = cloud_frac < 1.0 ? beam_frac / (1.0 - cloud_frac) : beam_frac;
+  const SkyDiscs discs{sun, physics::moon_position(scenario.epoch_utc_ns + view.sim_time_ns, place),
+                       sensor_m >= sky_now.cloud_base_m ? beam_above_frac : beam_frac};
   std::vector<double> face_k;
   if (solid) {
     face_k.resize(solid->solver().faces().size());
@@ -422,7 +422,7 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
   }
   for (std::size_t b = 0; b < bands.size(); ++b) {
     BandRadiance& band = bands[b];
-    band.set_air(now.air_k, sun, beam_frac, sky_now);
+    band.set_air(now.air_k, sun, beam_frac, beam_above_frac, sky_now);
     // Compute the radiance that every patch sends out.
     const double around = band.black(now.surroundings_k);
     const double level_sky = band.sky_mean(1.0);  // patches hold faces of several tilts
@@ -466,12 +466,12 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
       const BandRadiance::Leaving leaving{e * band.black(kelvin[i]) + (1.0 - e) * incoming,
                                           (1.0 - e) * sunlight, kelvin[i]};
       plane[hit.pixel] =
-          static_cast<float>(band.at_aperture(leaving, sensor_m, hit.range_m, hit.direction.z));
+          static_cast<float>(band.at_aperture(leaving, sensor_m, hit.range_m, hit.direction));
     });
     // Fill the pixels of the sky.
     for (std::size_t p = 0; p < sky_rays.size(); ++p) {
       if (sky_rays[p] == glm::dvec3(0.0)) continue;
-      plane[p] = static_cast<float>(band.sky(sensor_m, sky_rays[p].z) +
+      plane[p] = static_cast<float>(band.sky(sensor_m, sky_rays[p]) +
                                     discs.radiance_w_m2_sr(band, view, p));
     }
   }

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/geometric.hpp>
+#include <span>
 
 #include "emit/physics/clear_sky.hpp"
 #include "emit/physics/constants.hpp"
@@ -127,6 +129,8 @@ physics::Result<BandRadiance> BandRadiance::create(const scene::ScenarioDesc& sc
         }
         out.air_terms_ = std::move(*terms);
         out.column_ = std::move(*column);
+        out.scatter_ =
+            physics::SunScatter::build(*out.column_, scene::spectral_band(scenario.bands[band]));
       } else if (entry.table.empty()) {
         out.terms_ = entry.terms;
         out.vertical_frac_ = entry.vertical_transmittance_frac;
@@ -150,7 +154,7 @@ physics::Result<BandRadiance> BandRadiance::create(const scene::ScenarioDesc& sc
 }
 
 void BandRadiance::set_air(double air_k, const physics::SunPosition& sun, double beam_frac,
-                           const physics::SkyState& sky_now) {
+                           double beam_above_frac, const physics::SkyState& sky_now) {
   air_ = black(air_k);
   sky_now_ = sky_now;
   sky_air_ = black(air_k + sky_now.warmer_k);
@@ -166,6 +170,12 @@ void BandRadiance::set_air(double air_k, const physics::SunPosition& sun, double
                                     physics::AirPath::to_space(*column_, place_m_, shown_rad),
                                     physics::AirSource::sun_lowtran)
                               : 0.0;
+    shine_.reset();
+    if (scatter_ && shown_rad > 0.0 && beam_above_frac > 0.0) {
+      const double per_au2 = 1.0 / (sun.distance_au * sun.distance_au);
+      shine_ = {scatter_->beams(*column_, std::span(&shown_rad, 1)), sun.direction_enu,
+                beam_frac * per_au2, beam_above_frac * per_au2};
+    }
   } else {
     through = table_ ? table_->out(sin_sun).transmittance_frac
                      : std::pow(vertical_frac_, air_mass(sin_sun));
@@ -177,7 +187,17 @@ void BandRadiance::set_air(double air_k, const physics::SunPosition& sun, double
   sky_means_.fill(0.0);
   for (int i = 0; i < rings; ++i) {
     const double elevation = (i + 0.5) / rings * physics::kPi / 2.0;
-    const double radiance = sky(0.0, std::sin(elevation));
+    // Take the phase functions' mean all around.
+    physics::SunScatter::Kinds phase{};
+    for (int k = 0; k < kSectors && shine_; ++k) {
+      const double azimuth = (k + 0.5) / kSectors * physics::kPi;
+      const double cosine =
+          std::sin(elevation) * shine_->to_sun.z +
+          std::cos(elevation) * std::hypot(shine_->to_sun.x, shine_->to_sun.y) * std::cos(azimuth);
+      const auto one = scatter_->phase_per_sr(cosine);
+      for (std::size_t j = 0; j < phase.size(); ++j) phase[j] += one[j] / kSectors;
+    }
+    const double radiance = sky(0.0, std::sin(elevation), phase);
     for (std::size_t t = 0; t <= kTiltSteps; ++t) {
       const double tilt = std::min(static_cast<double>(t) / kTiltSteps, 0.999) * physics::kPi;
       double cosines = 0.0;
@@ -208,8 +228,19 @@ double BandRadiance::emissivity(const scene::Material& material) const {
   return material.emissivity_frac;
 }
 
+physics::SunScatter::Kinds BandRadiance::scattered(const physics::AirPath& path,
+                                                   double sensor_m) const {
+  physics::SunScatter::Kinds light{};
+  if (!shine_) return light;
+  scatter_->scattered_w_m2(path, shine_->beams, std::span(&light, 1));
+  const double share = sensor_m >= sky_now_.cloud_base_m ? shine_->above_frac : shine_->share_frac;
+  for (double& x : light) x *= share;
+  return light;
+}
+
 double BandRadiance::at_aperture(const Leaving& leaving, double sensor_m, double range_m,
-                                 double sin_elevation) const {
+                                 const glm::dvec3& direction) const {
+  const double sin_elevation = direction.z;
   if (column_) {
     const double height_m = place_m_ + sensor_m;
     const auto path =
@@ -232,7 +263,14 @@ double BandRadiance::at_aperture(const Leaving& leaving, double sensor_m, double
                              ? std::lerp(log_depth(tau[1]), log_depth(tau[2]), std::min(hot, 1.0))
                              : std::lerp(log_depth(tau[0]), log_depth(tau[1]), warm);
     const double thermal = std::exp(-std::exp(depth));
-    return thermal * leaving.thermal + tau[2] * leaving.sunlight + seen.path_radiance_w_m2_sr[0];
+    double sum =
+        thermal * leaving.thermal + tau[2] * leaving.sunlight + seen.path_radiance_w_m2_sr[0];
+    if (shine_) {
+      const auto light = scattered(path, sensor_m);
+      const auto phase = scatter_->phase_per_sr(glm::dot(direction, shine_->to_sun));
+      for (std::size_t k = 0; k < light.size(); ++k) sum += light[k] * phase[k];
+    }
+    return sum;
   }
   const double sum = leaving.thermal + leaving.sunlight;
   if (table_) {
@@ -247,7 +285,14 @@ double BandRadiance::at_aperture(const Leaving& leaving, double sensor_m, double
   return tau * sum + (1.0 - tau) * air_;
 }
 
-double BandRadiance::sky(double sensor_m, double sin_elevation) const {
+double BandRadiance::sky(double sensor_m, const glm::dvec3& direction) const {
+  physics::SunScatter::Kinds phase{};
+  if (shine_) phase = scatter_->phase_per_sr(glm::dot(direction, shine_->to_sun));
+  return sky(sensor_m, direction.z, phase);
+}
+
+double BandRadiance::sky(double sensor_m, double sin_elevation,
+                         const physics::SunScatter::Kinds& phase_per_sr) const {
   if (!has_air_) return 0.0;
   double clear_w_m2_sr = 0.0;
   double cover = sky_now_.cloud_cover_frac;
@@ -255,6 +300,8 @@ double BandRadiance::sky(double sensor_m, double sin_elevation) const {
     const auto path = physics::AirPath::to_space(*column_, place_m_ + sensor_m,
                                                  std::asin(std::clamp(sin_elevation, -1.0, 1.0)));
     clear_w_m2_sr = air_terms_->path_radiance_w_m2_sr(path, sky_warmer_k_);
+    const auto light = scattered(path, sensor_m);
+    for (std::size_t k = 0; k < light.size(); ++k) clear_w_m2_sr += light[k] * phase_per_sr[k];
     if (sensor_m >= sky_now_.cloud_base_m) cover = 0.0;
   } else if (table_) {
     clear_w_m2_sr = table_->out(sin_elevation).path_radiance_w_m2_sr;

@@ -2,12 +2,14 @@
 #pragma once
 #include <array>
 #include <cstddef>
+#include <glm/ext/vector_double3.hpp>
 #include <optional>
 #include <vector>
 
 #include "emit/physics/air_model.hpp"
 #include "emit/physics/atmosphere_table.hpp"
 #include "emit/physics/error.hpp"
+#include "emit/physics/sky/sun_scatter.hpp"
 #include "emit/physics/sky_state.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/scene/scene_desc.hpp"
@@ -46,10 +48,10 @@ class BandRadiance {
   [[nodiscard]] static physics::Result<BandRadiance> create(const scene::ScenarioDesc& scenario,
                                                             std::size_t band);
 
-  /// Sets the air temperature, the sun, the share of a clear sky's direct sun that shines, and the
-  /// sky.
+  /// Sets the air temperature, the sun, the shares of a clear sky's direct sun that shine below and
+  /// above the clouds, and the sky.
   void set_air(double air_k, const physics::SunPosition& sun, double beam_frac,
-               const physics::SkyState& sky_now);
+               double beam_above_frac, const physics::SkyState& sky_now);
   /// Returns the in-band radiance of a blackbody, W m-2 sr-1.
   [[nodiscard]] double black(double kelvin) const { return integral_.radiance_w_m2_sr(kelvin); }
   /// Returns the emissivity of a material in this band.
@@ -72,13 +74,13 @@ class BandRadiance {
     double sunlight = 0.0;  ///< reflected
     double surface_k = 0.0;
   };
-  /// Returns the radiance of a surface as seen through `range_m` of air, along a line of sight with
-  /// this sine of the elevation from a height above the world's origin.
+  /// Returns the radiance of a surface as seen through `range_m` of air, along a line of sight in a
+  /// direction (unit vector, ENU) from a height above the world's origin.
   [[nodiscard]] double at_aperture(const Leaving& leaving, double sensor_m, double range_m,
-                                   double sin_elevation) const;
-  /// Returns the radiance of the sky at a sine of the elevation, W m-2 sr-1, from a height above
-  /// the world's origin.
-  [[nodiscard]] double sky(double sensor_m, double sin_elevation) const;
+                                   const glm::dvec3& direction) const;
+  /// Returns the radiance of the sky in a direction, W m-2 sr-1, from a height above the world's
+  /// origin.
+  [[nodiscard]] double sky(double sensor_m, const glm::dvec3& direction) const;
 
  private:
   explicit BandRadiance(const scene::SpectralBand& band) : integral_(band), name_(band.name) {}
@@ -89,6 +91,21 @@ class BandRadiance {
   std::optional<physics::AtmosphereTable> table_;
   std::optional<physics::AirColumn> column_;  ///< built-in air, with air_terms_
   std::optional<physics::BandAir> air_terms_;
+  std::optional<physics::SunScatter> scatter_;  ///< empty where sunlight hardly counts
+  /// Sun of the instant, empty where none is scattered.
+  struct Shine {
+    physics::SunScatter::Beams beams;
+    glm::dvec3 to_sun{0.0};
+    double share_frac = 0.0;  ///< by a clear sky's at 1 au, below clouds
+    double above_frac = 0.0;  ///< the same above them
+  };
+  std::optional<Shine> shine_;
+  /// Light that a path scatters at the instant, W m-2 by kind, for a sensor at a height.
+  [[nodiscard]] physics::SunScatter::Kinds scattered(const physics::AirPath& path,
+                                                     double sensor_m) const;
+  /// The sky for a phase function of the scattered light.
+  [[nodiscard]] double sky(double sensor_m, double sin_elevation,
+                           const physics::SunScatter::Kinds& phase_per_sr) const;
   double place_m_ = 0.0;       ///< height of the world's origin above sea level
   double warmer_k_ = 0.0;      ///< air at sea level against that of the climate
   double sky_warmer_k_ = 0.0;  ///< the same in the sky

@@ -10,6 +10,7 @@
 const int kAirHeights = 22;
 const int kAirRanges = 29;
 const int kAirElevations = 48;
+const int kAirPhases = 129;
 const float kAirNearestM = 1.0;
 const float kAirRangeNodesPerUnit = 28.0 / 11.5129254649702;    // by ln(100 km / 1 m)
 const float kAirElevationScale = 0.03;
@@ -59,6 +60,21 @@ vec4 air_view_node(int first, AirPlace place) {
   vec4 near = mix(EMIT_AIR_VIEW(low), EMIT_AIR_VIEW(low + 1), place.along);
   vec4 far = mix(EMIT_AIR_VIEW(high), EMIT_AIR_VIEW(high + 1), place.along);
   return mix(near, far, place.across);
+}
+
+// Phase functions at the cosine of the angle between a line of sight and the sun, sr-1, by kind of scatterer. `first` is
+// the index of the first node of a table of scattered sunlight, at whose end they lie.
+vec4 air_sun_phase(int first, float cosine) {
+  vec2 place = air_view_cell(sqrt(max(0.5 - 0.5 * cosine, 0.0)) * float(kAirPhases - 1), kAirPhases);
+  int low = first + kAirHeights * kAirRanges + kAirElevations + int(place.x);
+  return mix(EMIT_AIR_VIEW(low), EMIT_AIR_VIEW(low + 1), place.y);
+}
+
+// Sunlight that the air scatters at a place of the view, W m-2 sr-1: for the sky its radiance, along a line of sight its
+// radiance by 1 - tau of the first source. Its table has the nodes of the view, but their numbers are light by kind of
+// scatterer.
+float air_sun_w_m2_sr(int first, AirPlace place, float cosine) {
+  return dot(air_view_node(first, place), air_sun_phase(first, cosine));
 }
 
 // Transmittance over a range for a logarithm of the mean extinction.

@@ -6,6 +6,7 @@
 //   EMIT_AIR_TERMS  bit per band: the air is a sum of at most EMIT_TERMS exponential terms
 //   EMIT_AIR_TABLE  bit per band: the air is a table
 //   EMIT_AIR_MODEL  bit per band: the air is built in
+//   EMIT_AIR_SUN    bit per band, if there are any: built-in air that scatters sunlight by day
 //   EMIT_OUTPUTS    planes besides radiance, EMIT_OUTPUT_*
 //   EMIT_CLUTTER    defined: some materials vary from place to place; EMIT_CLUTTER_EMISSIVITY: their emissivity too
 //   EMIT_LOBES      index of the first number of the lobes, if there are glossy materials
@@ -268,6 +269,9 @@ void write_pixel(ivec2 px) {
   AirPlace air_place = air_view_sky_place(sin_elevation);
   AirPlace sight_place = air_view_sight_place(frame.sensor_height_m + range_m * sin_elevation, range_m);
   if (surface) air_place = sight_place;
+#ifdef EMIT_AIR_SUN
+  float ray_sun_cosine = dot(frame.to_sun, mat3(frame.relworld_from_sensor) * ray) / ray_length;
+#endif
   bool clamped = false;
   bool nonfinite = false;
 #ifdef EMIT_LOBES
@@ -298,6 +302,12 @@ void write_pixel(ivec2 px) {
     vec4 sight = vec4(0.0);
     if ((EMIT_AIR_MODEL >> i & 1u) != 0u) {
       sight = air_view_node(int(bands[i].air_view_first), air_place);
+#ifdef EMIT_AIR_SUN
+      // Sunlight that the air scatters comes on top of what it emits.
+      if ((EMIT_AIR_SUN >> i & 1u) != 0u && bands[i].air_sun_first != 0u) {
+        sight.w += air_sun_w_m2_sr(int(bands[i].air_sun_first), air_place, ray_sun_cosine);
+      }
+#endif
       float seen_w_m2_sr = through_air_w_m2_sr(sight, leaving, seen.temperature_k, range_m);
       radiance_w_m2_sr = surface ? seen_w_m2_sr : sight.w;
     } else if ((EMIT_AIR_TABLE >> i & 1u) != 0u) {

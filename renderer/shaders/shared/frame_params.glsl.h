@@ -180,7 +180,7 @@ struct BandParams {
   float sky_air_radiance_w_m2_sr;       // blackbody as warm as the air of the sky, times the clear share
   float cloud_radiance_w_m2_sr;         // of the clouds, times their cover
   float clear_sky_frac;                 // share of the sky without clouds
-  uint unused1;
+  uint air_sun_first;                   // index of the first node of the air's scattered sunlight; 0: there is none
   float sun_disc_w_m2_sr;               // radiance of the sun: outside the air if that is built in, else as seen
   float moon_through_frac;              // share of the moon's light that clouds leave, and other air than the built-in one
   float moon_reflected_w_m2_sr;         // sunlight that the moon sends from where the sun stands in the zenith

@@ -35,10 +35,11 @@ constexpr Model kModels[] = {
       "airless topocentric azimuth and elevation of the sun, deg", false},
      run_sun_position},
     {{"air-path", kAirPathInputs, kAirPathOutputs,
-      "transmittance and thermal radiance of the air between sensor and target"},
+      "transmittance and thermal radiance of the air between sensor and target; with the sun, by "
+      "its apparent elevation and its azimuth from the line of sight, also what it scatters"},
      run_air_path},
     {{"air-sky", kAirSkyInputs, kAirSkyOutputs,
-      "transmittance of the air to space and radiance of the clear sky"},
+      "transmittance of the air to space and radiance of the clear sky; with the sun likewise"},
      run_air_sky},
     {{"air-sun", kAirSunInputs, kAirSunOutputs,
       "direct sunlight at sea level in a band, normal to the sun, at 1 au"},

@@ -27,9 +27,10 @@ inline constexpr std::string_view kSunPositionInputs = "year,month,day,hours_ut,
 inline constexpr std::string_view kSunPositionOutputs = "azimuth,elevation";
 
 inline constexpr std::string_view kAirPathInputs =
-    "model,vis_km,band,source,h_sensor_m,h_target_m,range_m";
+    "model,vis_km,band,source,h_sensor_m,h_target_m,range_m[,sun_elevation_deg,sun_azimuth_deg]";
 inline constexpr std::string_view kAirPathOutputs = "tau_band,path_radiance_w_m2_sr";
-inline constexpr std::string_view kAirSkyInputs = "model,vis_km,band,h_sensor_m,elevation_deg";
+inline constexpr std::string_view kAirSkyInputs =
+    "model,vis_km,band,h_sensor_m,elevation_deg[,sun_elevation_deg,sun_azimuth_deg]";
 inline constexpr std::string_view kAirSkyOutputs = "tau_flat,tau_sun,sky_radiance_w_m2_sr";
 inline constexpr std::string_view kAirSunInputs = "model,vis_km,band,sun_elevation_deg";
 inline constexpr std::string_view kAirSunOutputs = "e_ground_w_m2";

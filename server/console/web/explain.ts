@@ -19,7 +19,7 @@ const TERMS: [string, string][] = [
   ["emission_w_m2_sr", "emission"], ["sky_w_m2_sr", "reflected sky"], ["neighbours_w_m2_sr", "reflected neighbours"],
   ["sun_w_m2_sr", "reflected sun"], ["lobe_sky_w_m2_sr", "sky in the lobe"],
   ["lobe_neighbours_w_m2_sr", "neighbours in the lobe"], ["glint_w_m2_sr", "glint"], ["path_w_m2_sr", "path"],
-  ["gas_w_m2_sr", "gas"],
+  ["scattered_w_m2_sr", "scattered sun"], ["bodies_w_m2_sr", "sun and moon"], ["gas_w_m2_sr", "gas"],
 ];
 
 interface Row {

@@ -81,7 +81,7 @@ std::vector<std::vector<std::string>> term_rows(const ExplainedBand& band) {
   const double sum = band.terms.sum_w_m2_sr();
   for (const auto& [name, value] : named_terms(band.terms)) {
     if (name == "gas" && !has_gas(band.terms)) continue;
-    if (name == "sun and moon" && value == 0.0) continue;
+    if ((name == "scattered sun" || name == "sun and moon") && value == 0.0) continue;
     const bool of_lobe = name.ends_with("in the lobe") || name == "glint";
     if (of_lobe && !has_lobe(band.terms)) continue;
     out.push_back({std::string(name), fmt::format("{:.6g}", value),
@@ -129,7 +129,7 @@ std::string headline(const Explanation& found) {
 
 }  // namespace
 
-std::array<std::pair<std::string_view, double>, 10> named_terms(
+std::array<std::pair<std::string_view, double>, 11> named_terms(
     const renderer::RadianceTerms& terms) {
   return {{{"emission", terms.emission_w_m2_sr},
            {"reflected sky", terms.sky_w_m2_sr},
@@ -139,6 +139,7 @@ std::array<std::pair<std::string_view, double>, 10> named_terms(
            {"neighbours in the lobe", terms.lobe_neighbours_w_m2_sr},
            {"glint", terms.glint_w_m2_sr},
            {"path", terms.path_w_m2_sr},
+           {"scattered sun", terms.scattered_w_m2_sr},
            {"sun and moon", terms.bodies_w_m2_sr},
            {"gas", terms.gas_w_m2_sr}}};
 }
@@ -188,7 +189,8 @@ Json explain_json(const Explanation& found) {
     terms.set("lobe_sky_w_m2_sr", t.lobe_sky_w_m2_sr);
     terms.set("lobe_neighbours_w_m2_sr", t.lobe_neighbours_w_m2_sr);
     terms.set("glint_w_m2_sr", t.glint_w_m2_sr);
-    terms.set("path_w_m2_sr", t.path_w_m2_sr).set("bodies_w_m2_sr", t.bodies_w_m2_sr);
+    terms.set("path_w_m2_sr", t.path_w_m2_sr).set("scattered_w_m2_sr", t.scattered_w_m2_sr);
+    terms.set("bodies_w_m2_sr", t.bodies_w_m2_sr);
     terms.set("gas_w_m2_sr", t.gas_w_m2_sr);
     Json json = Json::object();
     json.set("band", band.name).set("pixel_w_m2_sr", band.pixel_w_m2_sr);

@@ -52,7 +52,7 @@ struct Explanation {
 };
 
 /// Terms of a radiance with their names, in the order in which they are shown.
-[[nodiscard]] std::array<std::pair<std::string_view, double>, 10> named_terms(
+[[nodiscard]] std::array<std::pair<std::string_view, double>, 11> named_terms(
     const renderer::RadianceTerms& terms);
 
 [[nodiscard]] std::string explain_text(const Explanation& found);

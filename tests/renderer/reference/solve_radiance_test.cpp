@@ -4,12 +4,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <span>
 #include <tuple>
 #include <vector>
 
 #include "emit/physics/air_view.hpp"
+#include "emit/physics/clear_sky.hpp"
 #include "emit/physics/constants.hpp"
 #include "emit/physics/planck.hpp"
 #include "emit/physics/sky_state.hpp"
@@ -67,7 +70,7 @@ TEST(ReferenceSky, agrees_with_the_tables_of_the_renderer_under_clouds) {
     // Colder than a clear sky, half covered, overcast, and warmer than the air.
     for (const double longwave_w_m2 : {290.0, 350.0, 385.0, 420.0}) {
       const auto sky_now = physics::sky_state(longwave_w_m2, air_k, 280.0, 0.0, {});
-      own->set_air(air_k, {}, 0.0, sky_now);
+      own->set_air(air_k, {}, 0.0, 0.0, sky_now);
       const double cloud =
           physics::band_radiance({band.lo_um, band.hi_um, {}}, physics::Kelvin(sky_now.cloud_k))
               .radiance_w_m2_sr;
@@ -80,7 +83,8 @@ TEST(ReferenceSky, agrees_with_the_tables_of_the_renderer_under_clouds) {
                   table);
       for (const double elevation_deg : {1.0, 5.0, 20.0, 60.0, 90.0}) {
         const double sine = std::sin(elevation_deg * physics::kDegree);
-        const double expected = own->sky(20.0, sine);
+        const double expected =
+            own->sky(20.0, {std::sqrt(1.0 - std::min(1.0, sine * sine)), 0.0, sine});
         EXPECT_NEAR(physics::air_sky(table, static_cast<float>(sine)).path_radiance_w_m2_sr,
                     expected, 0.02 * expected)
             << band.name << ' ' << longwave_w_m2 << ' ' << elevation_deg;
@@ -95,6 +99,68 @@ TEST(ReferenceSky, agrees_with_the_tables_of_the_renderer_under_clouds) {
             << band.name << ' ' << longwave_w_m2 << ", normal up " << normal_up;
       }
     }
+  }
+}
+
+TEST(ReferenceSky, agrees_with_the_tables_of_the_renderer_in_scattered_sunlight) {
+  scene::ScenarioDesc scenario;
+  scenario.place.height_m = 120.0;
+  scenario.atmosphere.enabled = true;
+  const physics::AirSpec spec{physics::AirClimate::midlatitude_winter, 10.0, 1.0};
+  scenario.bands.push_back({"3-5", 3.0, 5.0, {}});
+  scene::BandAtmosphere air;
+  air.band = "3-5";
+  air.model = spec;
+  scenario.atmosphere.bands.push_back(air);
+  const physics::Band band{3.0, 5.0, {}};
+  const auto column = physics::AirColumn::build(spec);
+  ASSERT_TRUE(column) << column.error().text;
+  auto own = BandRadiance::create(scenario, 0);
+  ASSERT_TRUE(own) << own.error().text;
+  const physics::BandAir terms = *physics::BandAir::build(band);
+  const auto scatter = physics::SunScatter::build(*column, band);
+  ASSERT_TRUE(scatter);
+  const physics::AirView::Subject subject{.band = &terms, .scatter = &*scatter};
+  const auto views = physics::AirView::build(*column, std::span(&subject, 1));
+  const double air_k = column->at(120.0).kelvin;
+  const physics::SkyState clear{.cloud_base_m = 1000.0};
+  for (const double sun_deg : {8.0, 40.0}) {
+    physics::SunPosition sun;
+    sun.elevation = physics::Radians(sun_deg * physics::kDegree);
+    sun.direction_enu = {0.0, std::cos(sun.elevation.value()), std::sin(sun.elevation.value())};
+    sun.distance_au = 1.01;
+    const double shown_sine = std::sin(physics::apparent_elevation(sun.elevation).value());
+    const double share = 0.8 / (1.01 * 1.01);
+    std::vector<physics::AirView::Node> table(physics::AirView::kSunNodes);
+    views[0].sun_at(140.0, {.sin_elevation = shown_sine, .share_frac = share}, table);
+    BandRadiance dark = *own;
+    dark.set_air(air_k, sun, 0.0, 0.0, clear);
+    own->set_air(air_k, sun, 0.8, 0.8, clear);
+    for (const double azimuth_deg : {0.0, 15.0, 90.0, 180.0}) {
+      for (const double elevation_deg : {2.0, 10.0, 45.0, 80.0}) {
+        const double sine = std::sin(elevation_deg * physics::kDegree);
+        const double cosine = std::cos(elevation_deg * physics::kDegree);
+        const glm::dvec3 ray{cosine * std::sin(azimuth_deg * physics::kDegree),
+                             cosine * std::cos(azimuth_deg * physics::kDegree), sine};
+        const double emitted = dark.sky(20.0, ray);
+        const auto shown = static_cast<double>(physics::air_sun_w_m2_sr(
+            physics::air_sky_node(table, static_cast<float>(sine)),
+            physics::air_sun_phase(table, static_cast<float>(glm::dot(ray, sun.direction_enu)))));
+        EXPECT_NEAR(emitted + shown, own->sky(20.0, ray), 0.02 * own->sky(20.0, ray))
+            << sun_deg << ' ' << azimuth_deg << ' ' << elevation_deg;
+      }
+    }
+    // Surfaces reflect the mean around the sky.
+    const auto tilts = views[0].scattered_sky_by_tilt_w_m2_sr(120.0, shown_sine);
+    for (const double normal_up : {1.0, 0.5, 0.0}) {
+      const double gained = own->sky_mean(normal_up) - dark.sky_mean(normal_up);
+      EXPECT_NEAR(share * physics::sky_at_tilt(tilts, normal_up), gained, 0.05 * gained)
+          << sun_deg << ' ' << normal_up;
+    }
+    // A path adds its light to what comes through it.
+    const glm::dvec3 level{0.0, 1.0, 0.0};
+    EXPECT_GT(own->at_aperture({1.0, 0.0, 300.0}, 20.0, 3000.0, level),
+              dark.at_aperture({1.0, 0.0, 300.0}, 20.0, 3000.0, level));
   }
 }
 

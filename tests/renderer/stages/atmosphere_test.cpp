@@ -3,8 +3,10 @@
 // precision.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <span>
 
 #include "emit/physics/air_model.hpp"
 #include "emit/physics/apparent_temperature.hpp"
@@ -13,6 +15,8 @@
 #include "emit/physics/climate/climate.hpp"
 #include "emit/physics/constants.hpp"
 #include "emit/physics/planck.hpp"
+#include "emit/physics/sky/sun_scatter.hpp"
+#include "emit/physics/sun.hpp"
 #include "support/renderer_scene.hpp"
 
 namespace emit::test {
@@ -184,6 +188,91 @@ TEST(RendererAtmosphere, every_pixel_sees_built_in_air_between_the_heights_of_ca
     EXPECT_LT(worst_surface, 0.02) << height_m;
     EXPECT_LT(worst_sky, 0.03) << height_m;
   }
+}
+
+TEST(RendererAtmosphere, air_scatters_sunlight_by_day_and_none_by_night) {
+  auto scenario = instant_scenario(write_quads("wide_plane", {ground(20000.0, 20000.0)}));
+  scenario.bands = {{"3-5", 3.0, 5.0, {}}, {"8-12", 8.0, 12.0, {}}};
+  scenario.materials[0].prescribed_k = 300.0;
+  scenario.materials[0].band_emissivity = {{"3-5", 1.0}, {"8-12", 1.0}};
+  scenario.atmosphere.enabled = true;
+  const physics::AirSpec spec{physics::AirClimate::us_standard, 10.0, 1.0};
+  for (const auto& band : scenario.bands) {
+    scene::BandAtmosphere air;
+    air.band = band.name;
+    air.model = spec;
+    scenario.atmosphere.bands.push_back(air);
+  }
+  scenario.place.height_m = 150.0;
+  scenario.weather[0].longwave_down_w_m2 = physics::sky_longwave_w_m2(
+      physics::Kelvin(scenario.weather[0].air_k),
+      physics::Kelvin(physics::usual_dew_point_k(scenario.weather[0].air_k)), 0.0);
+  const auto column = physics::AirColumn::build(spec);
+  ASSERT_TRUE(column) << column.error().text;
+  const physics::Band midwave{3.0, 5.0, {}};
+  const auto scatter = physics::SunScatter::build(*column, midwave);
+  ASSERT_TRUE(scatter);
+  const auto emission = *physics::BandAir::build(midwave);
+  const double warmer_k = (scenario.weather[0].air_k - column->at(150.0).kelvin) *
+                          std::exp(150.0 / physics::BandAir::kWarmthScaleM);
+  renderer::OutputOptions output;
+  output.depth = output.temperature = output.sun = output.sky = output.terms = true;
+  auto made = renderer::Renderer::create(scenario, {}, output);
+  ASSERT_TRUE(made) << made.error().text;
+  const physics::GeoPlace place{physics::Radians(scenario.place.lat_rad),
+                                physics::Radians(scenario.place.lon_rad), physics::Metres(150.0)};
+  double brightest = 0.0;
+  for (const double hours : {2.0, 15.0}) {
+    renderer::FrameRequest request;
+    request.sim_time_ns = request.thermal_time_ns = std::llround(hours * 3.6e12);
+    const physics::SunPosition sun =
+        physics::sun_position(scenario.epoch_utc_ns + request.sim_time_ns, place);
+    const bool day = sun.elevation.value() > 0.0;
+    ASSERT_EQ(day, hours < 12.0);
+    const double share =
+        physics::beam_share_frac(scenario.weather[0].direct_normal_w_m2, sun, place.height,
+                                 scenario.clear_sky.linke_turbidity) /
+        (sun.distance_au * sun.distance_au);
+    const double sun_rad = std::max(0.0, physics::apparent_elevation(sun.elevation).value());
+    const auto beams = scatter->beams(*column, std::span(&sun_rad, 1));
+    // Look past the sun, so that sky and ground are in view.
+    const glm::dvec3 eye{0.0, 0.0, 30.0};
+    const glm::dvec3 ahead =
+        glm::normalize(glm::dvec3(sun.direction_enu.x, sun.direction_enu.y, 0.05));
+    request.sensor_pose = {eye, physics::world_from_body_look_at(eye, eye + ahead)};
+    const int slot = (*made)->submit(request);
+    const auto& view = (*made)->collect(static_cast<renderer::SlotIndex>(slot));
+    double worst = 0.0;
+    for (std::uint32_t y = 0; y < 256; y += 15) {
+      for (std::uint32_t x = 0; x < 320; x += 40) {
+        const std::size_t i = y * 320 + x;
+        const auto parts = (*made)->radiance_terms(view, {x, y}, 1.0);
+        EXPECT_NEAR(parts[0].sum_w_m2_sr(), view.radiance_w_m2_sr[0][i],
+                    1e-4 * view.radiance_w_m2_sr[0][i]);
+        EXPECT_EQ(parts[1].scattered_w_m2_sr, 0.0);
+        EXPECT_EQ(parts[0].scattered_w_m2_sr > 0.0, day);
+        brightest = std::max(brightest, parts[0].scattered_w_m2_sr / parts[0].path_w_m2_sr);
+        const bool sky = std::isinf(view.depth_m[i]);
+        const glm::dvec3 ray =
+            world_point(scenario.sensor, request.sensor_pose, x, y, sky ? 1.0 : view.depth_m[i]) -
+            eye;
+        const double range_m = glm::length(ray);
+        const double sine = ray.z / range_m;
+        if (sky && sine < 0.01) continue;
+        const auto path = sky ? physics::AirPath::to_space(*column, 180.0, std::asin(sine))
+                              : physics::AirPath::between(*column, 180.0, 180.0 + ray.z, range_m);
+        physics::SunScatter::Kinds light{};
+        if (day) scatter->scattered_w_m2(path, beams, std::span(&light, 1));
+        const auto phase = scatter->phase_per_sr(glm::dot(ray / range_m, sun.direction_enu));
+        double expected = 0.0;
+        for (std::size_t k = 0; k < light.size(); ++k) expected += share * light[k] * phase[k];
+        const double all = expected + emission.path_radiance_w_m2_sr(path, warmer_k);
+        worst = std::max(worst, std::abs(parts[0].scattered_w_m2_sr - expected) / all);
+      }
+    }
+    EXPECT_LT(worst, 0.02) << hours;
+  }
+  EXPECT_GT(brightest, 0.1);
 }
 
 /// Overcast over a metal of emissivity 0.1 by night, in one band.

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -70,6 +71,27 @@ TEST_F(Evaluate, AirGivesOneRowForEachRowAndNamesWhatItDoesNotKnow) {
       request("air-sky", "model,vis_km,band,h_sensor_m,elevation_deg\nus_standard,5,3-5,2,90\n"));
   ASSERT_TRUE(sky.has_value()) << sky.error().text;
   EXPECT_THAT(*sky, testing::StartsWith("tau_flat,tau_sun,sky_radiance_w_m2_sr\n0."));
+  // A sun adds what the air scatters: nothing at night, and most of it near the sun.
+  const std::string lit =
+      "model,vis_km,band,h_sensor_m,elevation_deg,sun_elevation_deg,sun_azimuth_deg\n";
+  const auto radiance = [&](const std::string& row) {
+    const auto text = evaluate(request("air-sky", lit + row));
+    EXPECT_TRUE(text) << text.error().text;
+    return physics::CsvTable::parse(*text, "result")->numbers("sky_radiance_w_m2_sr")->at(0);
+  };
+  const double night = radiance("us_standard,5,3-5,2,30,-5,0\n");
+  const double away = radiance("us_standard,5,3-5,2,30,40,90\n");
+  const double near = radiance("us_standard,5,3-5,2,30,40,0\n");
+  EXPECT_GT(away, 1.005 * night);
+  EXPECT_GT(near, 1.5 * away);
+  EXPECT_EQ(radiance("us_standard,5,8-12,2,30,40,0\n"), radiance("us_standard,5,8-12,2,30,-5,0\n"));
+  EXPECT_TRUE(std::isnan(radiance("us_standard,5,3-5,2,30,95,0\n")));
+  const auto half = evaluate(
+      request("air-sky",
+              "model,vis_km,band,h_sensor_m,elevation_deg,sun_elevation_deg\nus_standard,5,3-5,2,"
+              "90,30\n"));
+  ASSERT_FALSE(half.has_value());
+  EXPECT_THAT(half.error().text, HasSubstr("sun_azimuth_deg"));
   const auto sun =
       evaluate(request("air-sun", "model,vis_km,band,sun_elevation_deg\nus_standard,5,3-5,-1\n"));
   ASSERT_TRUE(sun.has_value()) << sun.error().text;

@@ -82,6 +82,29 @@ TEST(ShaderLib, AirAgreesWithItsTwinAndWithTheModel) {
   paths << "model,vis_km,band,source,h_sensor_m,h_target_m,range_m\n";
   std::ofstream skies(folder / "sky.csv");
   skies << "model,vis_km,band,h_sensor_m,elevation_deg\n";
+  std::ofstream lit_paths(folder / "lit_path.csv");
+  lit_paths << "model,vis_km,band,source,h_sensor_m,h_target_m,range_m,sun_elevation_deg,"
+               "sun_azimuth_deg\n";
+  std::ofstream lit_skies(folder / "lit_sky.csv");
+  lit_skies << "model,vis_km,band,h_sensor_m,elevation_deg,sun_elevation_deg,sun_azimuth_deg\n";
+  for (const char* band : {"3-5", "8-12"}) {
+    for (const double sensor_m : {70.0, 4000.0}) {
+      for (const double sun_deg : {-3.0, 4.0, 50.0}) {
+        for (const double azimuth_deg : {0.0, 20.0, 170.0}) {
+          for (const double range_m : {30.0, 9000.0}) {
+            lit_paths << "us_standard,10," << band << ",300K," << sensor_m << ',' << sensor_m + 25.0
+                      << ',' << range_m << ',' << sun_deg << ',' << azimuth_deg << '\n';
+          }
+          for (const double elevation_deg : {1.0, 30.0}) {
+            lit_skies << "us_standard,10," << band << ',' << sensor_m << ',' << elevation_deg << ','
+                      << sun_deg << ',' << azimuth_deg << '\n';
+          }
+        }
+      }
+    }
+  }
+  lit_paths.close();
+  lit_skies.close();
   std::ofstream suns(folder / "sun.csv");
   suns << "model,vis_km,band,sun_elevation_deg\n";
   for (const char* band : {"3-5", "3.4-4.1", "8-12", "7.7-9.3"}) {
@@ -113,6 +136,8 @@ TEST(ShaderLib, AirAgreesWithItsTwinAndWithTheModel) {
   };
   for (const Case& c : {Case{"air-path", "path.csv", {"tau_band", "path_radiance_w_m2_sr"}},
                         Case{"air-sky", "sky.csv", {"tau_flat", "tau_sun", "sky_radiance_w_m2_sr"}},
+                        Case{"air-path", "lit_path.csv", {"tau_band", "path_radiance_w_m2_sr"}},
+                        Case{"air-sky", "lit_sky.csv", {"tau_sun", "sky_radiance_w_m2_sr"}},
                         Case{"air-sun", "sun.csv", {"e_ground_w_m2"}}}) {
     const auto exact = air_rows(c.model, folder / c.file, Precision::float64, Device::cpu);
     const auto twin = air_rows(c.model, folder / c.file, Precision::float32, Device::cpu);

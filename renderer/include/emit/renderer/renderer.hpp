@@ -192,17 +192,19 @@ struct RadianceTerms {
   double lobe_sky_w_m2_sr = 0.0;
   double lobe_neighbours_w_m2_sr = 0.0;
   double glint_w_m2_sr = 0.0;
-  double path_w_m2_sr = 0.0;    ///< of the air in between; the sky itself where it is seen
-  double bodies_w_m2_sr = 0.0;  ///< of the sun's and the moon's disc
-  double gas_w_m2_sr = 0.0;     ///< of hot gas, smoke and flares in between
-  double gas_frac = 1.0;        ///< transmittance of these, which the terms above include
+  double path_w_m2_sr = 0.0;       ///< emission of the air in between; the sky where it is seen
+  double scattered_w_m2_sr = 0.0;  ///< sunlight that this air, or the sky, scatters
+  double bodies_w_m2_sr = 0.0;     ///< of the sun's and the moon's disc
+  double gas_w_m2_sr = 0.0;        ///< of hot gas, smoke and flares in between
+  double gas_frac = 1.0;           ///< transmittance of these, which the terms above include
   double emissivity_frac = 0.0;
   double air_frac = 1.0;      ///< transmittance for emission and for what is reflected
   double air_sun_frac = 1.0;  ///< transmittance for reflected sunlight
 
   [[nodiscard]] double sum_w_m2_sr() const noexcept {
     return emission_w_m2_sr + sky_w_m2_sr + neighbours_w_m2_sr + sun_w_m2_sr + lobe_sky_w_m2_sr +
-           lobe_neighbours_w_m2_sr + glint_w_m2_sr + path_w_m2_sr + bodies_w_m2_sr + gas_w_m2_sr;
+           lobe_neighbours_w_m2_sr + glint_w_m2_sr + path_w_m2_sr + scattered_w_m2_sr +
+           bodies_w_m2_sr + gas_w_m2_sr;
   }
 };
 

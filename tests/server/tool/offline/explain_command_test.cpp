@@ -74,7 +74,7 @@ TEST(CliExplain, the_terms_add_up_to_the_pixel_through_air_of_every_kind_and_ove
         const double pixel = number(band, "pixel_w_m2_sr");
         double sum = 0.0;
         for (const char* term : {"emission_w_m2_sr", "sky_w_m2_sr", "neighbours_w_m2_sr",
-                                 "sun_w_m2_sr", "path_w_m2_sr"}) {
+                                 "sun_w_m2_sr", "path_w_m2_sr", "scattered_w_m2_sr"}) {
           EXPECT_GE(number(band, term), -1e-6 * pixel) << term;
           sum += number(band, term);
         }
@@ -121,7 +121,11 @@ TEST(CliExplain, the_sky_is_a_path_without_a_surface) {
   const std::string json = read_text(folder.file("e.json"));
   EXPECT_NE(json.find("\"surface\": null"), std::string::npos) << json;
   for (const std::string& band : bands_of(json)) {
-    EXPECT_NEAR(number(band, "path_w_m2_sr") / number(band, "pixel_w_m2_sr"), 1.0, 1e-5);
+    const double sky = number(band, "path_w_m2_sr") + number(band, "scattered_w_m2_sr");
+    EXPECT_NEAR(sky / number(band, "pixel_w_m2_sr"), 1.0, 1e-5);
+    if (number(band, "scattered_w_m2_sr") > 0.0) {
+      EXPECT_NE(result.out.find("scattered sun"), std::string::npos) << result.out;
+    }
     EXPECT_EQ(number(band, "emission_w_m2_sr"), 0.0);
   }
 }

@@ -14,8 +14,9 @@
 /// heights, the clear sky by elevation, and the sun at a height (physics.md eq. 37 and 38).
 /// Absorbers are added up along the path, and a band is a sum of exponential terms in their
 /// amounts. The flat bands 3-5, 3.4-4.1, 8-12 and 7.7-9.3 um have ten terms of their own. All
-/// others are made of narrow pieces of the spectrum with four terms each. Clouds, rain and
-/// scattered sunlight are not part of it. Any thread after construction.
+/// others are made of narrow pieces of the spectrum with four terms each. Clouds and rain are not
+/// part of it; sunlight that the air scatters has its own model (sky/sun_scatter.hpp). Any thread
+/// after construction.
 namespace emit::physics {
 
 /// Model atmospheres (Anderson et al. 1986).
@@ -67,6 +68,7 @@ class AirColumn {
   struct Point {
     std::array<double, kAirAbsorbers> density_per_km{};
     double kelvin = 0.0;
+    double standard_air_frac = 0.0;  ///< density by that at 0 deg C and one atmosphere
   };
   /// Returns the air at a height, m. Heights outside 0..kAirTopM count as the nearest end. RT-safe.
   [[nodiscard]] Point at(double height_m) const noexcept;
@@ -95,8 +97,9 @@ class AirPath {
   static constexpr std::size_t kMaxStretches = 112;
   struct Stretch {
     std::array<double, kAirAbsorbers> amount{};
-    double kelvin = 0.0;    ///< air temperature
-    double height_m = 0.0;  ///< above sea level
+    double kelvin = 0.0;           ///< air temperature
+    double height_m = 0.0;         ///< above sea level
+    double standard_air_km = 0.0;  ///< length of air at 0 deg C and one atmosphere
   };
 
   /// Returns the straight path between two points at heights above sea level, `range_m` apart. A

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "emit/physics/air_model.hpp"
+#include "emit/physics/sky/sun_scatter.hpp"
 #include "emit/physics/sky_state.hpp"
 
 /// The air model as the shader reads it: a small table around the sensor (physics.md eq. 39). The
@@ -38,13 +39,15 @@ class AirView {
   static constexpr Sources kPicture{AirSource::black_300k, AirSource::black_800k,
                                     AirSource::sun_lowtran};
 
-  /// Band and sources of a view. The band must outlive the call of build().
+  /// Band, sources and scattered sunlight of a view. What is pointed to must outlive the call of
+  /// build().
   struct Subject {
     const BandAir* band = nullptr;
     Sources sources = kPicture;
+    const SunScatter* scatter = nullptr;  ///< null: the view knows no scattered sunlight
   };
   /// Makes the views of several subjects in one atmosphere, in their order. Setup only: some tens
-  /// of milliseconds.
+  /// of milliseconds, and some hundreds with scattered sunlight.
   [[nodiscard]] static std::vector<AirView> build(const AirColumn& column,
                                                   std::span<const Subject> subjects);
 
@@ -63,6 +66,33 @@ class AirView {
   /// @pre out.size() == kNodes
   void at(double sensor_m, const Weather& weather, std::span<Node> out) const noexcept;
   static constexpr double kMostWarmerK = 40.0;
+
+  /// Elevations of the sun for which scattered sunlight is tabulated: uniform on the same axis as
+  /// those of the sky, from 0 to the zenith.
+  static constexpr std::size_t kSuns = 12;
+  /// Nodes of a table of scattered sunlight: those of the view, then the phase functions.
+  static constexpr std::size_t kSunNodes = kNodes + SunScatter::kPhaseNodes;
+  /// Sunlight of an instant.
+  struct Sunlight {
+    double sin_elevation = 0.0;  ///< apparent
+    double share_frac = 0.0;     ///< sunlight below clouds and haze, by a clear sky's at 1 au
+    double cloud_cover_frac = 0.0;
+    double cloud_base_m = 0.0;  ///< above sea level
+  };
+  /// True if the view knows scattered sunlight.
+  [[nodiscard]] bool scatters() const noexcept { return !scattered_.empty(); }
+  /// Writes the table of the sunlight that reaches a sensor at a height above sea level, in the
+  /// places of at(). A node holds the light by kind of scatterer (SunScatter::scattered_w_m2), on
+  /// lines of sight by 1 - tau of the first source. The phase functions follow. RT-safe.
+  /// @pre scatters() and out.size() == kSunNodes
+  void sun_at(double sensor_m, const Sunlight& sun, std::span<Node> out) const noexcept;
+  /// Returns the radiance of the clear sky's scattered sunlight at a height for a sine of the
+  /// elevation, W m-2 sr-1 at 1 au: the mean over all azimuths. RT-safe. @pre scatters()
+  [[nodiscard]] double scattered_sky_w_m2_sr(double height_m, double sin_sun,
+                                             double sin_elevation) const noexcept;
+  /// Returns the same by the tilt of a face. RT-safe after the first call. @pre scatters()
+  [[nodiscard]] SkyByTilt scattered_sky_by_tilt_w_m2_sr(double height_m,
+                                                        double sin_sun) const noexcept;
 
   /// Returns the clear sky's radiance by the tilt of a face at a height, W m-2 sr-1. RT-safe after
   /// the first call.
@@ -85,7 +115,16 @@ class AirView {
   struct Place;
   [[nodiscard]] Place place_of(double sensor_m, double warmer_k) const noexcept;
   [[nodiscard]] static float radiance_at(const Place& place, std::size_t node) noexcept;
-  std::vector<Slice> slices_;  ///< [sensor][node]
+  /// Place of a sensor height and of a sun on the slices of scattered sunlight.
+  struct SunPlace;
+  [[nodiscard]] SunPlace sun_place_of(double sensor_m, double sin_sun) const noexcept;
+  [[nodiscard]] static Node scattered_at(const SunPlace& place, std::size_t node) noexcept;
+  /// Mean over all azimuths of the radiance of a node of the sky.
+  [[nodiscard]] double scattered_around(const SunPlace& place, double sin_sun, double sin_elevation,
+                                        std::size_t node) const noexcept;
+  std::vector<Slice> slices_;    ///< [sensor][node]
+  std::vector<Node> scattered_;  ///< at 1 au, [sun][sensor][node]
+  std::vector<Node> phases_;     ///< phase functions, or empty
 };
 
 /// Air between a sensor and a point, from a table.
@@ -93,9 +132,9 @@ struct AirSight {
   std::array<float, 3> transmittance_frac;  ///< by source
   float path_radiance_w_m2_sr = 0.0F;
 };
-/// Looks up the node of a line of sight of `range_m` to a target at a height above sea level, in
-/// float32 as the shader does. RT-safe.
-/// @pre table.size() == AirView::kNodes
+/// Looks up the node of a line of sight of `range_m` to a target at a height above sea level, of
+/// either table, in float32 as the shader does. RT-safe.
+/// @pre table.size() >= AirView::kNodes
 [[nodiscard]] AirView::Node air_sight_node(std::span<const AirView::Node> table, float target_m,
                                            float range_m) noexcept;
 /// Returns the path radiance of a line of sight from its node, W m-2 sr-1. RT-safe.
@@ -105,6 +144,19 @@ struct AirSight {
 /// @pre table.size() == AirView::kNodes
 [[nodiscard]] AirSight air_sight(std::span<const AirView::Node> table, float target_m,
                                  float range_m) noexcept;
+/// Returns the phase functions at the end of a table of scattered sunlight, for the cosine of the
+/// angle between the line of sight and the sun, sr-1, in float32 as the shader does. RT-safe.
+/// @pre sun_table.size() == AirView::kSunNodes
+[[nodiscard]] AirView::Node air_sun_phase(std::span<const AirView::Node> sun_table,
+                                          float cosine) noexcept;
+/// Returns the node of the sky in a direction, of either table. RT-safe.
+[[nodiscard]] AirView::Node air_sky_node(std::span<const AirView::Node> table,
+                                         float sin_elevation) noexcept;
+/// Returns the sum over the kinds of scatterers of a node's light times its phase function.
+[[nodiscard]] inline float air_sun_w_m2_sr(const AirView::Node& light,
+                                           const AirView::Node& phase) noexcept {
+  return light[0] * phase[0] + light[1] * phase[1] + light[2] * phase[2] + light[3] * phase[3];
+}
 /// Looks up the sky in a direction. The path radiance is that of the sky. RT-safe.
 [[nodiscard]] AirSight air_sky(std::span<const AirView::Node> table, float sin_elevation) noexcept;
 

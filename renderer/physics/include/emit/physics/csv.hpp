@@ -77,6 +77,8 @@ class CsvTable {
   /// @pre row < rows()
   [[nodiscard]] std::size_t line_of(std::size_t row) const;
 
+  /// True if the header names the column.
+  [[nodiscard]] bool has(std::string_view column) const noexcept;
   /// Reads a column of numbers. Errors: invalid_argument, when the column is missing; parse, when
   /// it exists twice, or when a cell is not a number (`nan` and `inf` are numbers here). The second
   /// kind names file, line and column.
