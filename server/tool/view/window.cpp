@@ -123,6 +123,8 @@ class GlfwWindow final : public Window {
     glPixelStorei(GL_PACK_ALIGNMENT, 1);
     glfwSetWindowUserPointer(window_, this);
     glfwSetKeyCallback(window_, on_key);
+    // A press that is over before the next poll() counts.
+    glfwSetInputMode(window_, GLFW_STICKY_MOUSE_BUTTONS, GLFW_TRUE);
     glfwSetScrollCallback(window_, on_scroll);
     return {};
   }
