@@ -19,6 +19,9 @@ namespace emit::reference {
 namespace {
 
 constexpr double kPatchM = 0.2;
+/// Distance of a face from the triangle that it stands for, at most: its plane is that of the
+/// cells, rounded, and the triangle has coordinates in float32.
+constexpr double kFaceToleranceM = 2e-5;
 /// Greatest number of reflections that are followed. Each round is weaker by reflectance times the
 /// share of the view that shows patches: a closed box that absorbs a hundredth needs some 1400.
 constexpr int kMostBounces = 20'000;
@@ -105,7 +108,7 @@ void SceneExchange::trace(std::span<const ExchangeFace> surfaces, const FaceFind
     const ExchangeFace& surface = surfaces[f];
     if (surface.enclosed) return;
     std::vector<HemisphereRay>& buffer = buffers.local();
-    scene.hemisphere({surface.centre_m, surface.normal, 0.0}, buffer,
+    scene.hemisphere({surface.centre_m, surface.normal, kFaceToleranceM}, buffer,
                      static_cast<std::uint32_t>(f));
     std::uint32_t sky = 0;
     std::uint32_t ground = 0;
@@ -305,7 +308,8 @@ double SunOnFaces::mean_frac(const SceneInstant& scene, const glm::dvec3& to_sun
       p[u] += kPlace[i] * (face.high_m[u] - face.low_m[u]);
       p[v] += kPlace[j] * (face.high_m[v] - face.low_m[v]);
       sum += kWeight[i] * kWeight[j] *
-             scene.sun_visible_frac_clipped({p, surfaces_[f].normal, 0.0}, to_sun).value_frac;
+             scene.sun_visible_frac_clipped({p, surfaces_[f].normal, kFaceToleranceM}, to_sun)
+                 .value_frac;
     }
   }
   return sum;
@@ -322,7 +326,8 @@ void SunOnFaces::visible_frac(const SceneInstant& scene, const glm::dvec3& to_su
   };
   std::vector<double> ray(n);
   for_range(n, 256, [&](std::size_t f) {
-    const bool lit = towards(f) && !scene.occluded({surfaces_[f].centre_m, to_sun, 0.0});
+    const bool lit =
+        towards(f) && !scene.occluded({surfaces_[f].centre_m, to_sun, kFaceToleranceM});
     ray[f] = lit ? 1.0 : 0.0;
     out[f] = ray[f];
   });

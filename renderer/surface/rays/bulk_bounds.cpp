@@ -4,7 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 #include <vector>
 
 namespace emit::renderer {
@@ -15,6 +18,9 @@ namespace {
 constexpr double kResolvedM = 500.0;
 /// Ratio of the box of all to the box without strays from which on strays are ignored.
 constexpr double kStrayWidths = 16.0;
+/// Width of the cube around the box without strays in whose reach triangles are kept, in widths of
+/// that box.
+constexpr double kKeptWidths = 4.0;
 /// Share of the triangles that may be strays at either end of an axis.
 constexpr double kStrayFrac = 0.01;
 /// Number of triangles, evenly spread over all, that are looked at. At most twice as many are.
@@ -23,6 +29,39 @@ constexpr std::size_t kMaxLooked = 100'000;
 /// Returns half the diagonal of a box, 0 for an empty one.
 double half_diagonal_m(const scene::Aabb& box) {
   return box.empty() ? 0.0 : 0.5 * glm::length(box.max_m - box.min_m);
+}
+
+/// Returns the box of the triangles that reach into `around`: where that leaves out strays alone,
+/// it is the box of the scene without them, to the bit.
+scene::Aabb box_inside(std::span<const CasterPart> parts, const scene::Aabb& around) {
+  scene::Aabb all;
+  for (const CasterPart& part : parts) {
+    const scene::Mesh& mesh = *part.mesh;
+    scene::Aabb box;
+    for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
+      std::array<glm::dvec3, 3> corner_m;
+      bool known = true;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::uint32_t vertex = mesh.indices[i + k];
+        known = known && vertex < mesh.positions_m.size();
+        if (known) corner_m[k] = glm::dvec3(mesh.positions_m[vertex]);
+        known = known && std::isfinite(corner_m[k].x + corner_m[k].y + corner_m[k].z);
+      }
+      if (!known) continue;
+      scene::Aabb own;
+      for (const glm::dvec3& at_m : corner_m) {
+        own.add(glm::dvec3(part.frame_from_mesh * glm::dvec4(at_m, 1.0)));
+      }
+      // The comparison fails for what is not finite.
+      if (!glm::all(glm::lessThanEqual(around.min_m, own.max_m)) ||
+          !glm::all(glm::lessThanEqual(own.min_m, around.max_m))) {
+        continue;
+      }
+      for (const glm::dvec3& at_m : corner_m) box.add(at_m);
+    }
+    if (!box.empty()) all.add(scene::transformed(box, part.frame_from_mesh));
+  }
+  return all;
 }
 
 }  // namespace
@@ -77,7 +116,17 @@ scene::Aabb bulk_bounds(std::span<const CasterPart> parts) {
   const glm::dvec3 half_m = 0.5 * (high_m - low_m);
   bulk.add(low_m - half_m);
   bulk.add(high_m + half_m);
-  return half_diagonal_m(all) > kStrayWidths * half_diagonal_m(bulk) ? bulk : all;
+  if (!(half_diagonal_m(all) > kStrayWidths * half_diagonal_m(bulk))) return all;
+  // Take what the scene is without its strays, so that these move nothing. They are farther off
+  // than a few widths.
+  const glm::dvec3 middle_m = 0.5 * (bulk.min_m + bulk.max_m);
+  const glm::dvec3 wide_m = bulk.max_m - bulk.min_m;
+  const double reach_m = 0.5 * kKeptWidths * std::max({wide_m.x, wide_m.y, wide_m.z});
+  scene::Aabb around;
+  around.add(middle_m - reach_m);
+  around.add(middle_m + reach_m);
+  const scene::Aabb kept = box_inside(parts, around);
+  return kept.empty() || half_diagonal_m(kept) > kStrayWidths * half_diagonal_m(bulk) ? bulk : kept;
 }
 
 scene::Aabb bulk_bounds(const scene::SceneGeometry& geometry) {

@@ -2,6 +2,7 @@
 // The solution of a whole scene: a block on the ground that the test builds.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -190,6 +191,32 @@ TEST(ReferenceSolve, ShadowLiesAwayFromTheSun) {
   EXPECT_GT(at(0.5, 0.0), at(-0.4, 0.0) + 5.0F);
   EXPECT_NEAR(image.depth_m[24 * 64 + 2], 6.0F, 0.01F);
   for (const float value : image.radiance_w_m2_sr[0]) EXPECT_TRUE(std::isfinite(value));
+}
+
+TEST(ReferenceSolve, WallsSeeSunAndSkyThoughFloat32RoundsTheirPlanes) {
+  // The planes of cells are rounded to a micrometre, those of triangles to float32: 0.2 and 0.3 m
+  // lie on either side of them.
+  for (const double half_m : {0.2, 0.25, 0.3, 0.35}) {
+    TestScene t = block_scene();
+    t.geometry.meshes.pop_back();
+    t.geometry.instances.pop_back();
+    scene::Mesh block;
+    add_box(block, {-half_m, -half_m, 0.0}, {half_m, half_m, 2.0 * half_m});
+    finish_mesh(t, std::move(block), 1);
+    const glm::dvec3 middle{0.0, 0.0, half_m};
+    const std::array<SolveView, 2> views{
+        view_at(1800.0, middle + glm::dvec3(3.0, 0.0, 0.0), middle),
+        view_at(1800.0, middle + glm::dvec3(-3.0, 0.0, 0.0), middle)};
+    std::array<float, 2> wall_k{};
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      const auto images = solve(t.scenario, t.geometry, std::span(&views[i], 1), quick());
+      ASSERT_TRUE(images.has_value()) << images.error().text;
+      wall_k[i] = (*images)[0].temperature_k[24 * 64 + 32];
+    }
+    // The sun stands in the east. Within half an hour it warms that wall by 10 K.
+    EXPECT_GT(wall_k[0], wall_k[1] + 5.0F) << half_m;
+    EXPECT_LT(wall_k[1], 296.0F) << half_m;
+  }
 }
 
 TEST(ReferenceSolve, ResumedRunGivesTheSameBitsAndAMisfitIsRefused) {

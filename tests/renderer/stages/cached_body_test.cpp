@@ -97,11 +97,10 @@ class BodyRun {
     if (made) renderer_ = std::move(*made);
   }
   [[nodiscard]] renderer::Renderer& renderer() { return *renderer_; }
-  /// Temperature of a side of the box.
-  float shell_k(std::int64_t now_ns) {
+  /// Temperature of the face of the box that a camera sees from there, by default of a side.
+  float shell_k(std::int64_t now_ns, const glm::dvec3& from = {0.0, -6.0, kUpM}) {
     renderer::FrameRequest request;
     request.sim_time_ns = request.thermal_time_ns = now_ns;
-    const glm::dvec3 from{0.0, -6.0, kUpM};
     request.sensor_pose = {from, physics::world_from_body_look_at(from, {0.0, 0.0, kUpM})};
     const int slot = renderer_->submit(request);
     const auto& view = renderer_->collect(static_cast<renderer::SlotIndex>(slot));
@@ -134,6 +133,68 @@ TEST(RendererBody, CoolsDownWithItsInteriorAsTheirHeatBalanceSays) {
       EXPECT_NEAR(run.shell_k(minutes * kMinuteNs + 120 * kSecondNs), truth.shell_k, 0.4);
     }
   }
+}
+
+/// Steady temperatures of a shell of one roof, four sides and a bottom of one size, and of its
+/// interior, under a sky that is colder than the air and all that stands around.
+struct ColdSoak {
+  double roof_k = 0.0;
+  double side_k = 0.0;
+  double interior_k = 0.0;
+};
+ColdSoak cold_soak(const scene::BodyInterior& interior, double air_k, double sky_w_m2,
+                   double film_w_m2_k) {
+  constexpr double kEmissivity = 0.9;
+  const double inside_w_m2_k = 1.0 / (kSteel.thickness_m / kSteel.conductivity_w_m_k +
+                                      kFilm.thickness_m / kFilm.conductivity_w_m_k);
+  const double around_w_m2 = physics::kStefanBoltzmannWPerM2K4 * std::pow(air_k, 4.0);
+  const auto face_k = [&](double sky_frac, double interior_k) {
+    double low = 100.0;
+    double high = 400.0;
+    for (int i = 0; i < 60; ++i) {
+      const double t = 0.5 * (low + high);
+      const double gained = kEmissivity * (sky_frac * sky_w_m2 + (1.0 - sky_frac) * around_w_m2 -
+                                           physics::kStefanBoltzmannWPerM2K4 * std::pow(t, 4.0)) +
+                            film_w_m2_k * (air_k - t) + inside_w_m2_k * (interior_k - t);
+      (gained > 0.0 ? low : high) = t;
+    }
+    return low;
+  };
+  ColdSoak out;
+  double low = 100.0;
+  double high = 400.0;
+  for (int i = 0; i < 60; ++i) {
+    out.interior_k = 0.5 * (low + high);
+    const auto into = [&](double sky_frac) {
+      return inside_w_m2_k * (face_k(sky_frac, out.interior_k) - out.interior_k);
+    };
+    const double gained = into(1.0) + 4.0 * into(0.5) + into(0.0) +
+                          6.0 * interior.ventilation_w_m2_k * (air_k - out.interior_k);
+    (gained > 0.0 ? low : high) = out.interior_k;
+  }
+  out.roof_k = face_k(1.0, out.interior_k);
+  out.side_k = face_k(0.5, out.interior_k);
+  return out;
+}
+
+TEST(RendererBody, ColdSoakedUnderAClearSkyItIsWhatItsBalanceSays) {
+  constexpr double kColdK = 253.15;
+  constexpr double kClearW_m2 = 165.0;
+  const scene::BodyInterior interior;
+  auto scenario = night(interior);
+  scenario.weather[0].air_k = kColdK;
+  scenario.weather[0].environment_k = kColdK;
+  scenario.weather[0].longwave_down_w_m2 = kClearW_m2;
+  scenario.materials[0].base_k = 293.15;  // does not count: the layers rest on the body
+  scenario.materials[0].base_stated = false;
+  const ColdSoak truth = cold_soak(interior, kColdK, kClearW_m2, film_w_m2_k(scenario));
+  BodyRun run(scenario);
+  constexpr std::int64_t kSoakedNs = 600 * kMinuteNs;
+  EXPECT_NEAR(run.shell_k(kSoakedNs), truth.side_k, 0.4);
+  EXPECT_NEAR(run.shell_k(kSoakedNs, {0.1, -0.1, kUpM + 6.0}), truth.roof_k, 0.4);
+  // Roofs of vehicles lie 1 to 3 K below air of -20 C.
+  EXPECT_GT(truth.roof_k, 250.0);
+  EXPECT_LT(truth.roof_k, 252.0);
 }
 
 TEST(RendererBody, FollowsWeatherThatTheHostSends) {

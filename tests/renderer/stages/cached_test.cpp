@@ -426,5 +426,30 @@ TEST(RendererCachedSurface, PassesTemperaturesOnWithinAQuarterOfAMillikelvin) {
   }
 }
 
+TEST(RendererCached, GroundUnderARoofHasKnownItsShadeForDaysFromTheFirstFrameOn) {
+  // A roof of 8 m by 8 m, 2.5 m above ground; the camera looks below it.
+  auto quads = box({-4.0, -4.0, 2.5}, {4.0, 4.0, 2.7});
+  const Quad under = ground(4.0, 4.0, 2.5);
+  quads.push_back({under.d, under.c, under.b, under.a});
+  quads.push_back(ground(15.0, 15.0));
+  auto scenario = cached_scenario(write_quads("roof", quads));
+  scenario.thermal.spin_up_ns = 0;
+  // This is the start that scenarios have which state none.
+  scenario.thermal.history_start_ns = -84 * kHourNs;
+  scenario.thermal.steps = 64;
+  auto week = scenario;
+  week.thermal.history_start_ns = -168 * kHourNs;
+  week.thermal.steps = 300;
+  for (const std::int64_t hours : {4, 14}) {
+    const physics::Pose pose = looking({-2.0, -14.0, 1.6}, {0.5, 0.0, 0.0});
+    const auto first_k = Session(scenario).frame_k(hours * kHourNs, pose);
+    const auto week_k = Session(week).frame_k(hours * kHourNs, pose);
+    const Difference off = difference(week_k, first_k);
+    RecordProperty("p99_mk_" + std::to_string(hours), static_cast<int>(1e3 * off.p99_k));
+    RecordProperty("max_mk_" + std::to_string(hours), static_cast<int>(1e3 * off.max_k));
+    EXPECT_LT(off.p99_k, 0.5) << hours;
+  }
+}
+
 }  // namespace
 }  // namespace emit::test

@@ -131,6 +131,106 @@ TEST(Reflection, AFloorShowsTheHotWallBesideIt) {
   }
 }
 
+/// Share of the hemisphere of a level face that a level rectangle above it fills, from its height
+/// and the distances of its edges: the closed form for a rectangle with a corner overhead, summed
+/// over its four corners.
+double overhead_frac(double up_m, double west_m, double east_m, double south_m, double north_m) {
+  const auto corner = [&](double x_m, double y_m) {
+    const double x = x_m / up_m;
+    const double y = y_m / up_m;
+    const double u = std::hypot(1.0, x);
+    const double v = std::hypot(1.0, y);
+    return (x / u * std::atan(y / u) + y / v * std::atan(x / v)) / (2.0 * physics::kPi);
+  };
+  return corner(east_m, north_m) - corner(west_m, north_m) - corner(east_m, south_m) +
+         corner(west_m, south_m);
+}
+
+TEST(Reflection, GroundBesideAHotSquareHasTheTemperatureOfItsBalance) {
+  constexpr double kHotK = 800.0;
+  constexpr double kUpM = 1.5;
+  constexpr double kBaseK = 260.0;
+  constexpr double kFilm = 12.0;
+  constexpr double kSkyW_m2 = 200.0;
+  const scene::Layer foam{0.03, 0.03, 30.0, 1000.0};
+  auto scenario = held_scenario(
+      write_quads(
+          "plain",
+          {{{-60.0, -60.0, 0.0}, {60.0, -60.0, 0.0}, {60.0, 60.0, 0.0}, {-60.0, 60.0, 0.0}}}),
+      kHotK, 1.0);
+  scene::Material hot = scenario.materials[0];
+  hot.name = "hot";
+  scene::Material& ground = scenario.materials[0];
+  ground.prescribed_k.reset();
+  ground.emissivity_frac = 0.9;
+  ground.layers = {foam};
+  ground.modes.clear();
+  ground.base_k = kBaseK;
+  scenario.weather[0].film_w_m2_k = kFilm;
+  scenario.materials.push_back(hot);
+  scene::ObjectDesc square = scenario.objects[0];
+  square.name = "square";
+  square.material = "hot";
+  // The square looks down.
+  square.gltf = write_quads(
+      "square", {{{-0.5, -0.5, kUpM}, {-0.5, 0.5, kUpM}, {0.5, 0.5, kUpM}, {0.5, -0.5, kUpM}}});
+  scenario.objects.push_back(square);
+  scenario.thermal.lateral = false;
+  scenario.thermal.history_start_ns = -8 * 3600 * kSecondNs;
+  scenario.thermal.steps = 30;
+  scenario.thermal.spacing = scene::StepSpacing::geometric;
+  scenario.sensor.width_px = 128;
+  scenario.sensor.height_px = 96;
+  const double black_w_m2 = physics::kStefanBoltzmannWPerM2K4;
+  const auto truth_k = [&](double square_frac) {
+    const double in_w_m2 =
+        (1.0 - square_frac) * kSkyW_m2 + square_frac * black_w_m2 * std::pow(kHotK, 4.0);
+    double low = 100.0;
+    double high = 800.0;
+    for (int i = 0; i < 60; ++i) {
+      const double t = 0.5 * (low + high);
+      const double gained = 0.9 * (in_w_m2 - black_w_m2 * std::pow(t, 4.0)) +
+                            kFilm * (scenario.weather[0].air_k - t) +
+                            foam.conductivity_w_m_k / foam.thickness_m * (kBaseK - t);
+      (gained > 0.0 ? low : high) = t;
+    }
+    return low;
+  };
+  double worst_k = 0.0;
+  double hottest_k = 0.0;
+  double farthest_m = 0.0;
+  std::size_t over = 0;
+  std::size_t compared = 0;
+  for (const physics::Pose& pose :
+       {look({0.0, -6.0, 4.0}, {0.0, 0.5, 0.0}), look({0.0, -30.0, 8.0}, {0.0, -8.0, 0.0})}) {
+    const Frame frame = shot(scenario, pose);
+    ASSERT_EQ(frame.temperature_k.size(), 128U * 96U);
+    for (std::uint32_t y = 0; y < 96; ++y) {
+      for (std::uint32_t x = 0; x < 128; ++x) {
+        const std::size_t i = y * 128 + x;
+        const glm::dvec3 at_m = world_point(scenario.sensor, pose, x, y, frame.depth_m[i]);
+        const double away_m = std::hypot(at_m.x, at_m.y);
+        if (!(std::abs(at_m.z) < 0.01) || away_m < 0.7 || away_m > 20.0) continue;
+        const double expected_k =
+            truth_k(overhead_frac(kUpM, -0.5 - at_m.x, 0.5 - at_m.x, -0.5 - at_m.y, 0.5 - at_m.y));
+        const double off_k = std::abs(frame.temperature_k[i] - expected_k);
+        if (off_k > 0.3) ++over;
+        worst_k = std::max(worst_k, off_k);
+        hottest_k = std::max(hottest_k, expected_k);
+        farthest_m = std::max(farthest_m, away_m);
+        ++compared;
+      }
+    }
+  }
+  RecordProperty("worst_k", std::to_string(worst_k));
+  EXPECT_GT(compared, 5000U);
+  EXPECT_GT(hottest_k, truth_k(0.0) + 50.0);
+  EXPECT_GT(farthest_m, 19.0);
+  // Triangles between samples bend where the temperature changes by 40 K in a metre.
+  EXPECT_LT(1000 * over, compared);
+  EXPECT_LT(worst_k, 0.5);
+}
+
 TEST(Reflection, AClosedRoomOfOneTemperatureShowsABlackbody) {
   constexpr double kRoomK = 320.0;
   for (const double emissivity_frac : {0.1, 0.6}) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/ext/matrix_transform.hpp>
 #include <glm/geometric.hpp>
 #include <random>
 
@@ -63,6 +64,34 @@ TEST(BulkBounds, leave_strays_out_wherever_they_are) {
     auto rays = CasterRays::create(scene.geometry);
     ASSERT_TRUE(rays);
     EXPECT_LT(glm::length(rays->origin_world_m()), 30.0);
+  }
+}
+
+TEST(BulkBounds, of_a_scene_with_strays_are_those_of_the_scene_without_them) {
+  // The street stands aside, turned, and is not symmetrical.
+  const auto make = [] {
+    SurfaceScene scene;
+    glm::dmat4 placed = glm::translate(glm::dmat4(1.0), glm::dvec3(137.3, -41.7, 12.9));
+    placed = glm::rotate(placed, 0.3, glm::dvec3(0.0, 0.0, 1.0));
+    const std::uint32_t plane =
+        scene.add_mesh(test::level_mesh(glm::vec3(-60.0F), glm::vec3(45.0F), 0.0F));
+    scene.add_static(plane, placed);
+    const std::uint32_t house =
+        scene.add_mesh(test::box_mesh(glm::vec3(-2.0F), glm::vec3(2.0F, 2.0F, 7.3F)));
+    for (int i = 0; i < 12; ++i) {
+      scene.add_static(house,
+                       glm::translate(placed, glm::dvec3(6.0 * i - 44.0, 5.0 * (i % 3), 0.0)));
+    }
+    return scene;
+  };
+  const scene::Aabb clean = bulk_bounds(make().geometry);
+  for (const glm::dvec3& far_m :
+       {glm::dvec3(0.0, 0.0, -6e6), glm::dvec3(2e5, 0.0, 0.0), glm::dvec3(-3e6, 4e6, 1e3)}) {
+    SurfaceScene scene = make();
+    scene.add_static(small_triangle(), far_m);
+    const scene::Aabb box = bulk_bounds(scene.geometry);
+    EXPECT_EQ(box.min_m, clean.min_m);
+    EXPECT_EQ(box.max_m, clean.max_m);
   }
 }
 
