@@ -126,6 +126,7 @@ struct Turn {
   const char* name;
   physics::Pose before;
   physics::Pose after;
+  double bar_k = 0.5;
 };
 void PrintTo(const Turn& turn, std::ostream* out) {
   *out << turn.name;
@@ -138,18 +139,18 @@ TEST_P(RendererCachedAttitude, ABodyThatTurnedLooksLikeOneThatStartedSo) {
   EXPECT_GT(found.pixels, 200U);
   // The slab reflects nine tenths. One that started so shows the ground with its own temperature,
   // and one that moved shows surroundings in its place.
-  EXPECT_LT(found.most_k, 0.7);
+  EXPECT_LT(found.most_k, GetParam().bar_k);
 }
 
 const physics::Pose kLevel = slab_pose(kHighM, 0.0, 0.0, 0.0);
-INSTANTIATE_TEST_SUITE_P(, RendererCachedAttitude,
-                         testing::Values(Turn{"rolled", kLevel, slab_pose(kHighM, 0.0, 0.0, 90.0)},
-                                         Turn{"pitched", kLevel, slab_pose(kHighM, 0.0, 35.0, 0.0)},
-                                         Turn{"yawed", kLevel, slab_pose(kHighM, 60.0, 0.0, 0.0)},
-                                         Turn{"inverted", kLevel,
-                                              slab_pose(kHighM, 0.0, 0.0, 180.0)},
-                                         Turn{"climbed", slab_pose(0.3, 0.0, 0.0, 0.0), kLevel}),
-                         [](const auto& turn) { return turn.param.name; });
+INSTANTIATE_TEST_SUITE_P(
+    , RendererCachedAttitude,
+    testing::Values(Turn{"rolled", kLevel, slab_pose(kHighM, 0.0, 0.0, 90.0)},
+                    Turn{"pitched", kLevel, slab_pose(kHighM, 0.0, 35.0, 0.0), 0.7},
+                    Turn{"yawed", kLevel, slab_pose(kHighM, 60.0, 0.0, 0.0)},
+                    Turn{"inverted", kLevel, slab_pose(kHighM, 0.0, 0.0, 180.0)},
+                    Turn{"climbed", slab_pose(0.3, 0.0, 0.0, 0.0), kLevel}),
+    [](const auto& turn) { return turn.param.name; });
 
 }  // namespace
 }  // namespace emit::test
