@@ -148,6 +148,19 @@ class Console(unittest.TestCase):
                 self.assertAlmostEqual(want, got, delta=0.2 * (found[1] - found[0]))
             self.assert_stays_on_this_machine(rig.daemon)
 
+    def test_fits_into_windows_of_any_width_from_1024_on(self):
+        with start(IG_CLOCK) as daemon:
+            self.open(daemon)
+            self.page.wait_for(f"{SHOWN} > 0", PATIENCE_S)
+            # A device with a long name stands in the header, as those of software renderers do.
+            self.page.evaluate("document.querySelector('#about').textContent = 'emitd 0.2.0 '.repeat(40)")
+            for width_px in (1024, 1200, 1400, 1545, 1920):
+                self.page.resize(width_px, 900)
+                right_px = self.page.evaluate(
+                    "Math.max(...[...document.querySelectorAll('nav button, main, aside')]"
+                    ".map((each) => each.getBoundingClientRect().right))")
+                self.assertLessEqual(right_px, width_px)
+
     def test_a_command_changes_the_run(self):
         with start(IG_CLOCK) as daemon:
             self.open(daemon)

@@ -82,7 +82,10 @@ class Check {
     const double largest_m = std::max({size_m.x, size_m.y, size_m.z});
     if (is_flat(size_m) && largest_m > 1.0) return;  // ground may have any size
     const double scale = likely_scale(largest_m);
-    if (scale == 1.0) return;
+    if (scale == 1.0) {
+      check_normalised(object, size_m);
+      return;
+    }
     add("units", object.name,
         fmt::format("its longest side is {:.4g} m; if it was exported in {}, set scale = {:g} "
                     "(now {:g})",
@@ -91,6 +94,29 @@ class Check {
                     : scale == 0.001 ? "millimetres"
                                      : "another unit",
                     object.scale * scale, object.scale));
+  }
+
+  /// Tools for games and for 3-D scans scale models to a longest side of 1 or 2, so that the other
+  /// sides have odd numbers.
+  void check_normalised(const scene::ObjectDesc& object, const glm::dvec3& size_m) {
+    constexpr double kSameFrac = 1e-3;
+    constexpr double kRoundM = 0.01;
+    const double longest_m = std::max({size_m.x, size_m.y, size_m.z}) / object.scale;
+    const bool is_unit =
+        std::abs(longest_m - 1.0) < kSameFrac || std::abs(longest_m - 2.0) < 2.0 * kSameFrac;
+    const auto is_round = [&](double side_m) {
+      const double steps = side_m / object.scale / kRoundM;
+      return std::abs(steps - std::round(steps)) < 0.02;
+    };
+    if (object.scale != 1.0 || !is_unit ||
+        (is_round(size_m.x) && is_round(size_m.y) && is_round(size_m.z))) {
+      return;
+    }
+    add("units", object.name,
+        fmt::format("its longest side is {:.4g} m, as of models that a tool has scaled to a unit: "
+                    "set scale to its true length over {:.4g}, and multiply the height in "
+                    "position_m by it",
+                    longest_m, longest_m));
   }
 
   void check_axes(const scene::ObjectDesc& object, const glm::dvec3& size_m) {

@@ -50,6 +50,9 @@ std::string skeleton_text(const scene::SceneSummary& model,
   }
   out += "\n";
   if (!options.ground_gltf.empty()) {
+    out += fmt::format(
+        "[thermal]\nsurroundings_material = {}   # the land beyond the ground below\n\n",
+        toml_quoted(options.ground_material));
     out += fmt::format("[[object]]\nname = \"ground\"\ngltf = {}\nmaterial = {}\n\n",
                        toml_quoted(options.ground_gltf), toml_quoted(options.ground_material));
   }

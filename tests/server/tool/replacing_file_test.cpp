@@ -7,6 +7,8 @@
 #include <iterator>
 #include <string>
 
+#include "support/emit_process.hpp"
+
 namespace emit::tool {
 namespace {
 
@@ -14,12 +16,7 @@ namespace fs = std::filesystem;
 
 class CliReplacingFile : public testing::Test {
  protected:
-  void SetUp() override {
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-    std::ofstream(folder_ / "kept") << "old";
-  }
-  void TearDown() override { fs::remove_all(folder_); }
+  void SetUp() override { std::ofstream(folder_ / "kept") << "old"; }
   static std::string read(const fs::path& file) {
     std::ifstream in(file);
     return {std::istreambuf_iterator<char>(in), {}};
@@ -28,7 +25,8 @@ class CliReplacingFile : public testing::Test {
     return std::distance(fs::directory_iterator(folder_), fs::directory_iterator());
   }
 
-  const fs::path folder_ = fs::path(testing::TempDir()) / "emit_replacing_file";
+  const test::TemporaryFolder own_;  // tests run beside each other
+  const fs::path folder_ = own_.path();
 };
 
 TEST_F(CliReplacingFile, the_target_changes_at_the_end_alone) {

@@ -141,6 +141,10 @@ TEST(CliScene, a_check_names_what_is_wrong) {
   EXPECT_NE(finding({}, {"--set", "object[car].position_m=[0,0,0.7]"})
                 .find("ground: car: it floats 0.7 m"),
             std::string::npos);
+  // A tool scaled the model so that its longest side is 1.
+  EXPECT_NE(finding({.left = 0.4578F, .up = 0.5883F, .forward = 1.0F}, {})
+                .find("units: car: its longest side is 1 m, as of models that a tool has scaled"),
+            std::string::npos);
   EXPECT_NE(finding({}, {"--set", "object[car].position_m=[0,0,-0.5]"})
                 .find("ground: car: it reaches 0.5 m below"),
             std::string::npos);

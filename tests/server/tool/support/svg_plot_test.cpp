@@ -27,8 +27,9 @@ TEST(SvgTornado, bars_go_from_zero_to_both_sides_in_proportion) {
   const tool::Tornado tornado{
       .title = "a & b",
       .label = "K",
-      .bars = {{.label = "wind <fast>", .title = "", .at_low = -2.0, .at_high = 1.0, .note = "2.1 K"},
-               {.label = "sun", .title = "", .at_low = 0.5, .at_high = -0.5, .note = ""}}};
+      .bars = {
+          {.label = "wind <fast>", .title = "", .at_low = -2.0, .at_high = 1.0, .note = "2.1 K"},
+          {.label = "sun", .title = "", .at_low = 0.5, .at_high = -0.5, .note = ""}}};
   const std::string svg = tool::svg_document(std::vector{tornado});
   EXPECT_THAT(svg, HasSubstr("a &amp; b"));
   EXPECT_THAT(svg, HasSubstr("wind &lt;fast&gt;"));
