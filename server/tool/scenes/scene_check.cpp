@@ -101,17 +101,15 @@ class Check {
   void check_normalised(const scene::ObjectDesc& object, const glm::dvec3& size_m) {
     constexpr double kSameFrac = 1e-3;
     constexpr double kRoundM = 0.01;
-    const double longest_m = std::max({size_m.x, size_m.y, size_m.z}) / object.scale;
+    if (object.scale != 1.0) return;
+    const double longest_m = std::max({size_m.x, size_m.y, size_m.z});
     const bool is_unit =
         std::abs(longest_m - 1.0) < kSameFrac || std::abs(longest_m - 2.0) < 2.0 * kSameFrac;
     const auto is_round = [&](double side_m) {
-      const double steps = side_m / object.scale / kRoundM;
+      const double steps = side_m / kRoundM;
       return std::abs(steps - std::round(steps)) < 0.02;
     };
-    if (object.scale != 1.0 || !is_unit ||
-        (is_round(size_m.x) && is_round(size_m.y) && is_round(size_m.z))) {
-      return;
-    }
+    if (!is_unit || (is_round(size_m.x) && is_round(size_m.y) && is_round(size_m.z))) return;
     add("units", object.name,
         fmt::format("its longest side is {:.4g} m, as of models that a tool has scaled to a unit: "
                     "set scale to its true length over {:.4g}, and multiply the height in "

@@ -49,7 +49,7 @@ struct Plot {
   std::vector<PlotSeries> series;
 };
 
-/// What an input does that is moved to both ends of its range.
+/// Input that is moved to both ends of its range, and the shifts that it causes.
 struct TornadoBar {
   std::string label;     ///< of the input
   std::string title;     ///< shown under the pointer; may be empty
