@@ -144,6 +144,11 @@ class Replay(unittest.TestCase):
             self.page.wait_for(f"{STATE}.loop_s !== null", PATIENCE_S)
             self.page.evaluate("(() => { const rate = document.querySelector('#replay-rate'); rate.value = 'max';"
                                "rate.onchange(); })()")
+            self.page.wait_for(f"{STATE}.rate === 0", PATIENCE_S)
+            # A page hears where the replay stands several times a second, so that the loop lasts two seconds here.
+            span_s = self.page.evaluate(f"{STATE}.loop_s[1] - {STATE}.loop_s[0]")
+            self.page.evaluate(f"emitConsole.replay.send('rate {span_s / 2.0:.9f}')")
+            self.page.wait_for(f"{STATE}.rate > 0", PATIENCE_S)
             self.page.press("s")
             # It goes from frame 8 back to frame 5, and not beyond frame 8.
             self.page.evaluate("(() => { window.seen = new Set(); window.watch = setInterval(() => "
