@@ -79,6 +79,10 @@ ROWS = [
          *[(per_minute(f"emitd_{name}_total"), name.removeprefix("frames_").replace("_", " "))
            for name in ("frames_shed", "frames_coarse", "targets_plain", "frames_entities_behind", "frames_warmed_up",
                         "poses_dropped", "device_failures")]),
+        ("Coarse frames by reason, per minute", "timeseries", 12, "none", "Why the surface is coarser than the scenario "
+         "asks. The log says each reason once in a run.",
+         *[(per_minute(f"emitd_frames_coarse_{name}_total"), name)
+           for name in ("camera", "fov", "samples", "meshes", "shade", "shadows", "weather", "edges")]),
         ("Heat beyond its formulae, frames per minute", "timeseries", 12, "none", "Moisture, snow and wind that the heat "
          "model does not hold for. Each frame says degraded.",
          *[(per_minute(f"emitd_frames_{name}_total"), name.replace("_", " "))

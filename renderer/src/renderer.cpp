@@ -705,8 +705,9 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
   const QualityLevel& level = kQualityLadder[view.quality_level];
   // Do the work of the CPU and bind everything.
   prepare(request, level);
-  view.stats.coarse = stage_->coarse_from(request.sensor_pose) || view.stats.rewarm_s > 0.0 ||
-                      is_beyond_sensor(fov_of(request));
+  view.stats.coarse = stage_->coarse_from(request.sensor_pose);
+  add(view.stats.coarse, CoarseReason::warmed_up, view.stats.rewarm_s > 0.0);
+  add(view.stats.coarse, CoarseReason::field_of_view, is_beyond_sensor(fov_of(request)));
   view.stats.heat_limits = stage_->heat_limits(request);
   constexpr double kLeastMm = 0.05;
   if (unknown_wet_ && history_.environment.rain_mm(request.thermal_time_ns - kLimitMemoryNs,

@@ -254,7 +254,7 @@ bool CachedStage::stands_near(const std::vector<Eye>& eyes, const RefineView::Ey
   });
 }
 
-bool CachedStage::coarse_from(const physics::Pose& camera) const noexcept {
+CoarseReasons CachedStage::coarse_from(const physics::Pose& camera) const noexcept {
   const RefineView::Eye here = eye_of(camera);
   // Compare the direction of the camera only if samples ran out. Then surfaces outside the planned
   // view got none.
@@ -262,11 +262,17 @@ bool CachedStage::coarse_from(const physics::Pose& camera) const noexcept {
       surface_->model().full ? std::cos(kFieldMarginFrac * half_diagonal_rad(sensor_)) : kAnyCosine;
   // Check the flags of the surface, then the positions it was prepared for. Meshes were simplified
   // only if the scenario has positions of the camera.
-  return visibly_simplified_ || surface_->model().full_in_view ||
-         surface_->exposure_tiles().short_of_tiles() || surface_->entity_shadows().stale() ||
-         surface_->lags() || surface_->columns_cut_short() ||
-         !stands_near(refined_eyes_, here, least_cos) ||
-         (!detail_eyes_.empty() && !stands_near(detail_eyes_, here, kAnyCosine));
+  CoarseReasons out;
+  add(out, CoarseReason::meshes, visibly_simplified_);
+  add(out, CoarseReason::samples, surface_->model().full_in_view);
+  add(out, CoarseReason::shade, surface_->exposure_tiles().short_of_tiles());
+  add(out, CoarseReason::entity_shadows, surface_->entity_shadows().stale());
+  add(out, CoarseReason::weather, surface_->lags());
+  add(out, CoarseReason::edges, surface_->columns_cut_short());
+  add(out, CoarseReason::camera,
+      !stands_near(refined_eyes_, here, least_cos) ||
+          (!detail_eyes_.empty() && !stands_near(detail_eyes_, here, kAnyCosine)));
+  return out;
 }
 
 void CachedStage::describe(SceneStats& stats) const noexcept {

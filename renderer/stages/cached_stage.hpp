@@ -42,7 +42,7 @@ class CachedStage final : public ThermalStage {
   }
   DrawnScene& drawn() noexcept override;
   void describe(SceneStats& stats) const noexcept override;
-  bool coarse_from(const physics::Pose& camera) const noexcept override;
+  CoarseReasons coarse_from(const physics::Pose& camera) const noexcept override;
   std::optional<std::uint32_t> nearest_sample(const SurfacePlace& place) const noexcept override;
   SampleReading sample_reading(std::uint32_t sample) const noexcept override;
   void prepare(const FrameRequest& request, CameraSetup& camera,

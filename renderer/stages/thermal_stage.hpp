@@ -83,10 +83,9 @@ class ThermalStage {
     return {};
   }
 
-  /// True when the surface was not prepared for a camera at this pose, so that the image may be
-  /// coarser than asked.
-  [[nodiscard]] virtual bool coarse_from(const physics::Pose& /*camera*/) const noexcept {
-    return false;
+  /// Returns why an image from a camera at this pose may be coarser than asked. RT-safe.
+  [[nodiscard]] virtual CoarseReasons coarse_from(const physics::Pose& /*camera*/) const noexcept {
+    return {};
   }
 
   /// Does the work of the CPU for a frame and fills the method's part of `frame`. The draw lists

@@ -21,7 +21,15 @@ namespace emit::server {
   X(weather_lost, "weather changes the source had no room for")                             \
   X(device_failures, "frames during which the driver reported an error")                    \
   X(clock_steps, "steps of the wall clock of more than 1 ms")                               \
-  X(frames_coarse, "frames whose camera stood where the surface was not prepared")          \
+  X(frames_coarse, "frames that may be coarser than asked, for the reasons that follow")    \
+  X(frames_coarse_camera, "of them: the camera is where the surface was not prepared")      \
+  X(frames_coarse_fov, "of them: a field of view that the sensor may not have")             \
+  X(frames_coarse_samples, "of them: thermal.max_samples ran out in view")                  \
+  X(frames_coarse_meshes, "of them: meshes were simplified visibly")                        \
+  X(frames_coarse_shade, "of them: entities' shade found no room, or moved too fast")       \
+  X(frames_coarse_shadows, "of them: more entities turned than get shadow maps at once")    \
+  X(frames_coarse_weather, "of them: surfaces that lack a change of weather or shade yet")  \
+  X(frames_coarse_edges, "of them: heat near edges not settled to 0.05 K yet")              \
   X(targets_plain, "small targets drawn plainly: too many in a frame for windows")          \
   X(frames_wet_unknown, "frames after rain on materials that state no store of water")      \
   X(frames_rain_shelter, "frames after rain whose entities left the places of its shelter") \

@@ -26,6 +26,7 @@ enum class EventKind : std::uint8_t {
   weather_lost,             ///< a = sim time of the sample, ns
   poses_dropped,            ///< a = how many
   heat_limit,               ///< a = renderer::HeatLimit, text = what it means
+  coarse,                   ///< a = renderer::CoarseReason, text = what it means
   warmed_up_again,          ///< a = time it took, ns, b = jump of simulation time, ns
   trigger_silent,           ///< a = number of the last one
   peer_refused,             ///< text = address, a = PeerRefusal

@@ -271,6 +271,9 @@ EventText describe_loss(const Event& event, const std::string& text) {
     case EventKind::heat_limit:
       return distinct_warn(
           fmt::format("event=heat_limit why=\"{}\" effect=\"frames are flagged degraded\"", text));
+    case EventKind::coarse:
+      return distinct_warn(
+          fmt::format("event=coarse why=\"{}\" effect=\"frames are flagged degraded\"", text));
     case EventKind::warmed_up_again:
       return warn(fmt::format(
           "event=warmed_up_again took_s={:.3f} jump_s={:.3f} effect=\"no frame "
@@ -314,6 +317,7 @@ EventText describe(const Event& event) {
     case EventKind::weather_lost:
     case EventKind::poses_dropped:
     case EventKind::heat_limit:
+    case EventKind::coarse:
     case EventKind::warmed_up_again:
       return describe_loss(event, text);
     case EventKind::slots_missed:

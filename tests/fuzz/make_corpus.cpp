@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <random>
 #include <string>
 #include <utility>
@@ -19,6 +20,8 @@
 #include "emit/protocol/pixel_codec.hpp"
 #include "emit/protocol/record/frame_log.hpp"
 #include "emit/protocol/record/log.hpp"
+#include "emit/protocol/record/mcap_reader.hpp"
+#include "emit/protocol/record/mcap_writer.hpp"
 #include "emit/protocol/resend.hpp"
 #include "emit/protocol/trigger.hpp"
 #include "emit/protocol/trigger_seal.hpp"
@@ -393,6 +396,35 @@ void make_fragment_seeds() {
 }
 
 /// Writes a log with an image that compresses and one that does not.
+/// Writes a log anew with the descriptors in its schemas cut to a few bytes. No reader looks into
+/// them, and in a seed of two messages they would take nine mutations out of ten.
+void shorten_schemas(const fs::path& log, std::uint32_t chunk_bytes) {
+  const fs::path whole = log.string() + ".whole";
+  fs::rename(log, whole);
+  auto reader = protocol::McapReader::open(whole);
+  auto writer = protocol::McapWriter::create(log, {.chunk_bytes = chunk_bytes});
+  if (!reader || !writer) std::abort();
+  std::map<std::uint16_t, std::uint16_t> channels;
+  for (auto more = reader->next(); more && *more; more = reader->next()) {
+    const protocol::McapMessage& message = reader->message();
+    const protocol::McapChannel& channel = *reader->channel(message.channel_id);
+    if (!channels.contains(message.channel_id)) {
+      const protocol::McapSchema& schema = *reader->schema(channel.schema_id);
+      const auto id = writer->add_schema(schema.name, schema.encoding, schema.data.substr(0, 4));
+      if (!id) std::abort();
+      const auto added = writer->add_channel(*id, channel.topic, channel.message_encoding);
+      if (!added) std::abort();
+      channels[message.channel_id] = *added;
+    }
+    static_cast<void>(writer->write(channels[message.channel_id], message.sequence,
+                                    static_cast<std::int64_t>(message.log_time_ns),
+                                    static_cast<std::int64_t>(message.publish_time_ns),
+                                    message.data));
+  }
+  static_cast<void>(writer->close());
+  fs::remove(whole);
+}
+
 void make_image_log_seed() {
   protocol::LogWriterOptions options;
   options.frames = true;
@@ -413,6 +445,7 @@ void make_image_log_seed() {
     static_cast<void>(writer->write_frame(image, 5'000'000));
   }
   static_cast<void>(writer->close());
+  shorten_schemas(seed("mcap_log", "images.mcap"), options.chunk_bytes);
 }
 
 void make_log_seeds() {
@@ -429,6 +462,7 @@ void make_log_seeds() {
       static_cast<void>(writer->write_journal(decision()));
     }
     static_cast<void>(writer->close());
+    shorten_schemas(seed("mcap_log", name), chunk_bytes);
   }
   make_image_log_seed();
 }

@@ -74,7 +74,7 @@ class Camera {
     const auto slot = static_cast<renderer::SlotIndex>(renderer_->submit(request));
     const auto& view = renderer_->collect(slot);
     EXPECT_FALSE(view.device_failed);
-    coarse_ = view.stats.coarse;
+    coarse_ = view.stats.coarse.any();
     const auto plane = view.radiance_w_m2_sr[0];
     Planes out{{plane.begin(), plane.end()},
                {view.temperature_k.begin(), view.temperature_k.end()}};

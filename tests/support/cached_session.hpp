@@ -81,7 +81,7 @@ class Session {
     EXPECT_EQ(view.stats.nonfinite_px, 0U);
     std::vector<float> out(view.temperature_k.begin(), view.temperature_k.end());
     objects_.assign(view.object_id.begin(), view.object_id.end());
-    coarse_ = view.stats.coarse;
+    coarse_ = view.stats.coarse.any();
     renderer_->release(static_cast<renderer::SlotIndex>(slot));
     return out;
   }

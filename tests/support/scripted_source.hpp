@@ -18,7 +18,7 @@ struct SourceScript {
   bool ready = true;                       ///< poll(): false holds frames back
   bool weather_full = false;               ///< apply_weather(): no room
   std::uint64_t dropped_poses = 0;         ///< of every frame's statistics
-  bool coarse = false;                     ///< likewise
+  renderer::CoarseReasons coarse;          ///< likewise
   renderer::HeatLimits heat_limits;        ///< likewise
   std::uint32_t plain_targets = 0;         ///< likewise
   std::atomic<bool> device_failed{false};  ///< of every frame collected

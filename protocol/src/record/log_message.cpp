@@ -59,7 +59,8 @@ Result<std::optional<LogTopic>> LogMessageDecoder::decode(const McapReader& from
 
 Result<void> LogMessageDecoder::take_host(const McapReader& from) {
   const McapMessage& message = from.message();
-  const DecodeStatus status = decode_host_frame(message.data, decoder_, host_);
+  if (!decoder_) decoder_.emplace();
+  const DecodeStatus status = decode_host_frame(message.data, *decoder_, host_);
   if (status == DecodeStatus::ok) return {};
   return bad_message(from, fmt::format("host message {} (frame {}): {}", message.sequence,
                                        host_.frame_number, to_string(status)));

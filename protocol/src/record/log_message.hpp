@@ -29,7 +29,7 @@ class LogMessageDecoder {
   [[nodiscard]] physics::Result<void> take_host(const McapReader& from);
   [[nodiscard]] physics::Result<void> take_journal(const McapReader& from);
 
-  HostFrameDecoder decoder_;
+  std::optional<HostFrameDecoder> decoder_;  ///< made for the first host frame: it is large
   HostFrameData host_;
   v1::JournalEntry journal_;
 };

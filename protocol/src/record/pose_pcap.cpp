@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <optional>
 #include <utility>
 
 #include "emit/protocol/codec.hpp"
@@ -20,7 +21,7 @@ struct PosePcapReader::Impl {
   std::filesystem::path path;
   CaptureReader capture;
   std::uint16_t port;
-  HostFrameDecoder decoder;
+  std::optional<HostFrameDecoder> decoder;  // made for the first datagram: it is large
   HostFrameData host;
   std::uint64_t refused = 0;
   std::string first_refusal;
@@ -47,8 +48,9 @@ Result<bool> PosePcapReader::next() {
   for (;;) {
     const auto more = impl_->capture.next();
     if (!more || !*more) return more;
+    if (!impl_->decoder) impl_->decoder.emplace();
     const DecodeStatus status =
-        decode_host_frame(impl_->capture.payload(), impl_->decoder, impl_->host);
+        decode_host_frame(impl_->capture.payload(), *impl_->decoder, impl_->host);
     if (status == DecodeStatus::ok) return true;
     if (++impl_->refused == 1) {
       impl_->first_refusal =

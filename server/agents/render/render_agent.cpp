@@ -71,6 +71,7 @@ bool RenderAgent::take_job() noexcept {
       weather_lost_ = false;
       dropped_poses_ = 0;
       heat_limits_.reset();
+      coarse_told_.reset();
       break;
     case RenderJob::Kind::frame: {
       if (count_ == kDepth) {
@@ -244,6 +245,26 @@ void RenderAgent::note_heat_limits(const renderer::HeatLimits& limits) noexcept 
   }
 }
 
+void RenderAgent::note_coarse(const renderer::CoarseReasons& reasons) noexcept {
+  // The counters are in the order of renderer::CoarseReason. A frame that warms up again is counted
+  // and told where it does so.
+  static constexpr std::array<Counter, renderer::kCoarseReasons - 1> kCounters{
+      Counter::frames_coarse_camera,  Counter::frames_coarse_fov,   Counter::frames_coarse_samples,
+      Counter::frames_coarse_meshes,  Counter::frames_coarse_shade, Counter::frames_coarse_shadows,
+      Counter::frames_coarse_weather, Counter::frames_coarse_edges};
+  static_assert(static_cast<std::size_t>(renderer::CoarseReason::warmed_up) == kCounters.size());
+  if (reasons.none()) return;
+  context_.counters.add(Counter::frames_coarse);
+  for (std::size_t i = 0; i < kCounters.size(); ++i) {
+    if (!reasons[i]) continue;
+    context_.counters.add(kCounters[i]);
+    if (coarse_told_[i]) continue;
+    coarse_told_[i] = true;
+    context_.render_events.push(EventKind::coarse, i, 0,
+                                renderer::text_of(static_cast<renderer::CoarseReason>(i)));
+  }
+}
+
 void RenderAgent::note_device(const renderer::FrameView& view) noexcept {
   if (!view.device_failed) {
     failures_ = 0;
@@ -325,13 +346,14 @@ void RenderAgent::finish_shot(InFlight& frame, std::size_t camera, RenderDone& d
   image.readback_end_ns = done.readback_end_ns;
   image.nonfinite_px = view.stats.nonfinite_px;
   image.clamped_px = view.stats.clamped_px;
-  image.coarse = view.stats.coarse || view.stats.plain_targets > 0 || view.stats.heat_limits.any();
+  image.coarse =
+      view.stats.coarse.any() || view.stats.plain_targets > 0 || view.stats.heat_limits.any();
   done.nonfinite_px += view.stats.nonfinite_px;
   done.clamped_px += view.stats.clamped_px;
   done.dropped_poses = view.stats.dropped_poses;
   note_dropped_poses(view.stats.dropped_poses);
   done.coarse = done.coarse || image.coarse;
-  if (view.stats.coarse) context_.counters.add(Counter::frames_coarse);
+  note_coarse(view.stats.coarse);
   note_heat_limits(view.stats.heat_limits);
   context_.counters.add(Counter::targets_plain, view.stats.plain_targets);
   // The level of the image that lost most stands for the frame.

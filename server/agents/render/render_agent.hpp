@@ -101,6 +101,7 @@ class RenderAgent final : public Agent {
   void note_dropped_poses(std::uint64_t in_run) noexcept;
   /// Counts the limits that the heat of a picture has passed, and tells each once in a run.
   void note_heat_limits(const renderer::HeatLimits& limits) noexcept;
+  void note_coarse(const renderer::CoarseReasons& reasons) noexcept;
   void note_device(const renderer::FrameView& view) noexcept;
   /// Sets Context::device_lost, upon which the daemon ends. No frame comes any more.
   void lose_device(std::string_view why) noexcept;
@@ -121,9 +122,10 @@ class RenderAgent final : public Agent {
   bool starved_ = false;
   /// Thermal clock of the frame submitted last; a reset of the run does not move the surface.
   std::optional<std::int64_t> last_thermal_ns_;
-  bool weather_lost_ = false;         // said so for this run
-  std::uint64_t dropped_poses_ = 0;   // counted in this run
-  renderer::HeatLimits heat_limits_;  // told in this run
+  bool weather_lost_ = false;            // said so for this run
+  std::uint64_t dropped_poses_ = 0;      // counted in this run
+  renderer::HeatLimits heat_limits_;     // told in this run
+  renderer::CoarseReasons coarse_told_;  // likewise
   bool job_prepared_ = false;  // entities of the job in front are applied; only submit is missing
 };
 

@@ -217,6 +217,8 @@ int run(const CampaignOptions& command) {
   if (!store) return fail(store.error());
   const InterruptGuard interrupt;
   if (command.element) return run_one(*loaded, *store, *command.element);
+  const auto claim = store->claim();
+  if (!claim) return fail(claim.error());
   Campaign campaign(command, *loaded, *store);
   if (auto done = campaign.run(); !done) return fail(done.error());
   return campaign.complete() ? kExitOk : kExitFailure;

@@ -2,10 +2,15 @@
 #include "tool/campaign/element_store.hpp"
 
 #include <fmt/format.h>
+#include <sys/file.h>
 
+#include <fcntl.h>
+
+#include <cerrno>
 #include <fstream>
 #include <iterator>
 #include <system_error>
+#include <utility>
 
 #include "tool/campaign/element_run.hpp"
 #include "tool/support/frame_files.hpp"
@@ -28,6 +33,18 @@ physics::Result<ElementStore> ElementStore::open(const std::filesystem::path& fo
     }
   }
   return store;
+}
+
+physics::Result<server::Fd> ElementStore::claim() const {
+  const auto file = folder_ / "campaign.lock";
+  const auto failure = [&file](const std::string& what) {
+    return physics::make_error(physics::ErrorCode::io, fmt::format("{}: {}", file.string(), what));
+  };
+  server::Fd lock(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644));
+  if (!lock) return failure(std::generic_category().message(errno));
+  if (::flock(lock.get(), LOCK_EX | LOCK_NB) == 0) return lock;
+  if (errno != EWOULDBLOCK) return failure(std::generic_category().message(errno));
+  return failure("another campaign runs in this folder: wait for it, or take another --out");
 }
 
 std::filesystem::path ElementStore::file(std::size_t element, const char* extension) const {

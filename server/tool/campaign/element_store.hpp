@@ -8,6 +8,7 @@
 
 #include "emit/config/campaign.hpp"
 #include "emit/physics/error.hpp"
+#include "rt/fd.hpp"
 #include "tool/campaign/campaign_elements.hpp"
 #include "tool/campaign/result_row.hpp"
 
@@ -20,6 +21,10 @@ class ElementStore {
  public:
   /// Makes the folders. Errors: io.
   [[nodiscard]] static physics::Result<ElementStore> open(const std::filesystem::path& folder);
+
+  /// Claims the folder for the process of a campaign, until the result is destroyed or the process
+  /// ends. Errors (io): another campaign runs in the folder, or its lock cannot be written.
+  [[nodiscard]] physics::Result<server::Fd> claim() const;
 
   /// Runs an element in this process and keeps its row, or its error. Errors: the element's own.
   [[nodiscard]] physics::Result<void> run(const config::CampaignDesc& campaign,

@@ -331,6 +331,11 @@ void Rendering::print_warnings(const renderer::FrameView& view) const {
                     "per pixel",
                     frame, view.stats.plain_targets));
   }
+  for (std::size_t i = 0; i < renderer::kCoarseReasons; ++i) {
+    if (!view.stats.coarse[i]) continue;
+    const auto reason = static_cast<renderer::CoarseReason>(i);
+    warn(fmt::format("{}{}: {}", frame, renderer::name_of(reason), renderer::text_of(reason)));
+  }
   for (std::size_t i = 0; i < renderer::kHeatLimits; ++i) {
     if (!view.stats.heat_limits[i]) continue;
     const auto limit = static_cast<renderer::HeatLimit>(i);
@@ -367,6 +372,12 @@ Json Rendering::frame_json(double time_s, std::size_t band, const renderer::Fram
     limits.push(Json(std::string(renderer::name_of(static_cast<renderer::HeatLimit>(i)))));
   }
   json.set("heat_limits", std::move(limits));
+  Json coarse = Json::array();
+  for (std::size_t i = 0; i < renderer::kCoarseReasons; ++i) {
+    if (!view.stats.coarse[i]) continue;
+    coarse.push(Json(std::string(renderer::name_of(static_cast<renderer::CoarseReason>(i)))));
+  }
+  json.set("coarse", std::move(coarse));
   json.set("radiance", plane_json(view.radiance_w_m2_sr[band]));
   if (!view.temperature_k.empty()) {
     const auto sky =
@@ -458,7 +469,10 @@ void add_options(CommandLine& line, RenderOptions& options) {
             "frame; without them several times add _t<time>, and several bands add _<band>, before "
             "the extension")
       .required();
-  line.path("--png", options.png, "False-colour image as PNG; the name is made as that of --out");
+  line.path(
+      "--png", options.png,
+      "False-colour image as PNG, from display.min_k to display.max_k of the scenario; the name "
+      "is made as that of --out");
   line.path("--film", options.film,
             "Film of the PNG pictures of the first band, in the order of the times: .webp "
             "(animated, lossless) or .mp4; needs the program ffmpeg");

@@ -57,7 +57,7 @@ void go_into_background() {
 }
 
 /// Renders the pixel and splits its radiance.
-Result<void> explain_frame(const scene::ScenarioDesc& scenario, const ProbeFinder& finder,
+Result<void> explain_frame(scene::ScenarioDesc& scenario, const ProbeFinder& finder,
                            const ProbePoint& pixel, int gpu_index, Explanation& found,
                            std::optional<ProbePlace>& place) {
   std::vector<OfflineShot> shots = sensor_shots(scenario, std::span(&found.time_s, 1));
@@ -65,6 +65,7 @@ Result<void> explain_frame(const scene::ScenarioDesc& scenario, const ProbeFinde
   place = finder.place(pixel, shots[0].sim_time_ns, shots[0].sensor_pose);
   renderer::OutputOptions output;
   output.temperature = output.depth = output.object = output.sun = output.sky = output.terms = true;
+  output.coverage = scenario.sensor.small_target_px > 0.0;
   output.slots = 2;
   auto frames = OfflineFrames::create(scenario, shots, output, gpu_index);
   if (!frames) return tl::unexpected(std::move(frames.error()));
@@ -72,6 +73,15 @@ Result<void> explain_frame(const scene::ScenarioDesc& scenario, const ProbeFinde
   if (!next) return tl::unexpected(next.error());
   const renderer::FrameView& view = **next;
   const std::size_t i = std::size_t{pixel.y_px} * view.width_px + pixel.x_px;
+  if (!view.coverage_frac.empty() && view.coverage_frac[i] > 0.0F) {
+    // A pixel of a small target is a mean over many samples, so it is drawn again like all others.
+    warn(
+        "the pixel shows a small target, which is drawn with one sample per pixel here "
+        "(sensor.small_target_px = 0)");
+    scenario.sensor.small_target_px = 0.0;
+    frames->reset();
+    return explain_frame(scenario, finder, pixel, gpu_index, found, place);
+  }
   if (std::isfinite(view.depth_m[i])) {
     ExplainedSurface surface;
     const scene::ObjectDesc& object =
@@ -166,15 +176,6 @@ Result<Explanation> explain(const ExplainOptions& command, scene::ScenarioDesc s
   const auto points = finder->read("px:" + command.px);
   if (!points) return tl::unexpected(physics::Error(points.error()).with_context("--px"));
   const ProbePoint& pixel = points->front();
-  // A pixel of a small target is a mean over many samples, so they are drawn like all others.
-  if (scenario.sensor.small_target_px > 0.0) {
-    scenario.sensor.small_target_px = 0.0;
-    if (std::ranges::any_of(scenario.objects, [](const scene::ObjectDesc& object) {
-          return object.entity_id != 0;
-        })) {
-      warn("small targets are drawn with one sample per pixel here (sensor.small_target_px = 0)");
-    }
-  }
   Explanation found{scenario.name, scenario.epoch_utc_ns, time_s, {pixel.x_px, pixel.y_px}};
   std::optional<ProbePlace> place;
   if (auto done = explain_frame(scenario, *finder, pixel, gpu_index, found, place); !done) {
@@ -191,11 +192,13 @@ Result<Explanation> explain(const ExplainOptions& command, scene::ScenarioDesc s
   for (int i = 0; i <= steps; ++i) {
     times_s.push_back(std::lerp(first_s, time_s, double{1} * i / steps));
   }
+  scenario.sensor.small_target_px = 0.0;  // the history is that of the place alone
   // The history is that of the mean material: what the clutter adds is known for this pixel alone.
   for (scene::Material& material : scenario.materials) material.clutter.reset();
   ProbeRun run(scenario, std::move(times_s),
                {finder->follow(*place, std::llround(1e9 * time_s), pixel.name)});
-  if (auto done = run.run(*finder, gpu_index); !done) {
+  // The frame has told what the scenario lacks, and this run begins where the history does.
+  if (auto done = run.run(*finder, gpu_index, SceneWarnings::known); !done) {
     return tl::unexpected(std::move(done.error()));
   }
   // The history is seen along the normal. Beside an edge the two pictures differ.

@@ -74,7 +74,8 @@ renderer::FrameRequest OfflineFrames::request(std::size_t index) const {
 Result<std::unique_ptr<OfflineFrames>> OfflineFrames::create(scene::ScenarioDesc scenario,
                                                              std::span<const OfflineShot> shots,
                                                              const renderer::OutputOptions& output,
-                                                             int gpu_index) {
+                                                             int gpu_index,
+                                                             SceneWarnings warnings) {
   EMIT_CHECK(!shots.empty());
   std::unique_ptr<OfflineFrames> out(new OfflineFrames(shots));
   keep_only_views_of(shots, scenario);
@@ -83,7 +84,11 @@ Result<std::unique_ptr<OfflineFrames>> OfflineFrames::create(scene::ScenarioDesc
   if (!created) return tl::unexpected(std::move(created.error()));
   out->renderer_ = std::move(*created);
   out->setup_ms_ = ms_since(start);
-  for (const std::string& text : out->renderer_->scene_stats().warnings) warn(text);
+  const auto tell = [warnings](const std::vector<std::string>& texts) {
+    if (warnings == SceneWarnings::known) return;
+    for (const std::string& text : texts) warn(text);
+  };
+  tell(out->renderer_->scene_stats().warnings);
   std::vector<std::int64_t> planned_ns;
   for (const OfflineShot& shot : out->shots_) {
     if (planned_ns.empty() || planned_ns.back() != shot.sim_time_ns) {
@@ -98,8 +103,7 @@ Result<std::unique_ptr<OfflineFrames>> OfflineFrames::create(scene::ScenarioDesc
     if (!warm) return tl::unexpected(std::move(warm.error()));
   }
   out->warm_up_ms_ = ms_since(start);
-  const renderer::SceneStats& stats = out->renderer_->scene_stats();
-  for (const std::string& text : renderer::warm_up_warnings(stats)) warn(text);
+  tell(renderer::warm_up_warnings(out->renderer_->scene_stats()));
   return out;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
@@ -12,6 +13,12 @@
 
 /// Frames without a daemon: commands render a scenario at instants of their choice.
 namespace emit::tool {
+
+/// Whether the user hears what a scenario lacks.
+enum class SceneWarnings : std::uint8_t {
+  told,   ///< as warnings
+  known,  ///< it has been told for the same scenario
+};
 
 /// One frame of a plan.
 struct OfflineShot {
@@ -32,7 +39,8 @@ class OfflineFrames {
   /// @pre `shots` is not empty.
   [[nodiscard]] static physics::Result<std::unique_ptr<OfflineFrames>> create(
       scene::ScenarioDesc scenario, std::span<const OfflineShot> shots,
-      const renderer::OutputOptions& output, int gpu_index);
+      const renderer::OutputOptions& output, int gpu_index,
+      SceneWarnings warnings = SceneWarnings::told);
 
   /// Renders the next shot of the plan. The frame is valid until the next call. Errors: those of
   /// Renderer::carry_on(), gpu (the device reported an error), internal (interrupted).

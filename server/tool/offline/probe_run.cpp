@@ -62,9 +62,9 @@ ProbeRun::ProbeRun(const scene::ScenarioDesc& scenario, std::vector<double> time
       points_(std::move(points)),
       samples_(points_.size()) {}
 
-Result<void> ProbeRun::run(const ProbeFinder& finder, int gpu_index) {
+Result<void> ProbeRun::run(const ProbeFinder& finder, int gpu_index, SceneWarnings warnings) {
   plan(finder);
-  return render(gpu_index);
+  return render(gpu_index, warnings);
 }
 
 /// Finds the surfaces, and plans a shot for each of them.
@@ -148,14 +148,14 @@ void ProbeRun::read_flux(const renderer::Renderer& renderer, ProbeRow& row) {
   if (sample) row.flux_w_m2 = renderer.sample_reading(*sample).flux_w_m2;
 }
 
-Result<void> ProbeRun::render(int gpu_index) {
+Result<void> ProbeRun::render(int gpu_index, SceneWarnings warnings) {
   if (shots_.empty()) return {};
   const auto forcing = ProbeForcing::create(scenario_, times_s_);
   if (!forcing) return tl::unexpected(forcing.error());
   renderer::OutputOptions output;
   output.temperature = output.depth = output.sun = output.sky = true;
   output.slots = 2;
-  auto frames = OfflineFrames::create(scenario_, shots_, output, gpu_index);
+  auto frames = OfflineFrames::create(scenario_, shots_, output, gpu_index, warnings);
   if (!frames) return tl::unexpected(std::move(frames.error()));
   for (std::size_t s = 0; s < shots_.size(); ++s) {
     const auto view = (*frames)->next();

@@ -56,7 +56,8 @@ class ProbeRun {
            std::vector<ProbePoint> points);
   /// Finds the surfaces of the points and reads their values. Warns of points without a surface.
   /// Errors: those of OfflineFrames and renderer::surface_forcing().
-  [[nodiscard]] physics::Result<void> run(const ProbeFinder& finder, int gpu_index);
+  [[nodiscard]] physics::Result<void> run(const ProbeFinder& finder, int gpu_index,
+                                          SceneWarnings warnings = SceneWarnings::told);
 
   [[nodiscard]] const std::vector<ProbePoint>& points() const noexcept { return points_; }
   [[nodiscard]] const std::vector<double>& times_s() const noexcept { return times_s_; }
@@ -67,7 +68,7 @@ class ProbeRun {
 
  private:
   void plan(const ProbeFinder& finder);
-  [[nodiscard]] physics::Result<void> render(int gpu_index);
+  [[nodiscard]] physics::Result<void> render(int gpu_index, SceneWarnings warnings);
   void read(const renderer::FrameView& view, const OfflineShot& shot,
             const renderer::SurfaceForcing& forcing, ProbeRow& row);
   void read_flux(const renderer::Renderer& renderer, ProbeRow& row);

@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <limits>
+#include <optional>
 
 #include "emit/reference/visibility.hpp"
 #include "emit/scene/mesh.hpp"
@@ -23,7 +24,10 @@ class Check {
  public:
   Check(const scene::ScenarioDesc& scenario, const scene::SceneGeometry& geometry,
         const reference::RayScene& rays)
-      : scenario_(scenario), geometry_(geometry), instant_(rays.at(first_ns(scenario))) {}
+      : scenario_(scenario),
+        geometry_(geometry),
+        rays_(rays),
+        instant_(rays.at(first_ns(scenario))) {}
 
   SceneReport run() {
     for (const std::string& text : scenario_.warnings) add("loader", "", text);
@@ -152,11 +156,19 @@ class Check {
     }
   }
 
-  /// Looks for what lies under the middle and the corners of the box of an object.
-  void check_ground(std::uint32_t index, const scene::Aabb& bounds) {
+  /// The box of an object at an instant, and how far its lowest point is above what lies under it.
+  struct Footing {
+    std::int64_t sim_time_ns = 0;
+    double gap_m = 0.0;
+    double slack_m = 0.0;  ///< a gap this wide is none
+  };
+
+  /// Returns the height of what lies under the middle and the corners of a box; minus infinity:
+  /// nothing lies there.
+  static double height_under(const reference::SceneInstant& instant, std::uint32_t index,
+                             const scene::Aabb& bounds) {
     const glm::dvec3 size_m = bounds.max_m - bounds.min_m;
-    if (is_flat(size_m) || scenario_.objects.size() < 2) return;
-    constexpr double kAboveM = 1e3;
+    constexpr double kAboveM = 1e-3;
     double ground_m = -std::numeric_limits<double>::infinity();
     for (const double x : {0.5, 0.1, 0.9}) {
       for (const double y : {0.5, 0.1, 0.9}) {
@@ -164,28 +176,90 @@ class Check {
                         bounds.max_m.z + kAboveM);
         // Go on through the object itself.
         for (int hits = 0; hits < 64; ++hits) {
-          const auto hit = instant_.first_hit({from, {0.0, 0.0, -1.0}, 1e-6});
+          const auto hit = instant.first_hit({from, {0.0, 0.0, -1.0}, 1e-6});
           if (!hit) break;
           if (hit->object != index) {
-            if (hit->position_world_m.z < bounds.max_m.z) {
-              ground_m = std::max(ground_m, hit->position_world_m.z);
-            }
+            ground_m = std::max(ground_m, hit->position_world_m.z);
             break;
           }
           from = hit->position_world_m - glm::dvec3(0.0, 0.0, 1e-5);
         }
       }
     }
-    if (!std::isfinite(ground_m)) return;
-    const double gap_m = bounds.min_m.z - ground_m;
+    return ground_m;
+  }
+
+  static std::optional<Footing> footing_of(const reference::SceneInstant& instant,
+                                           std::int64_t sim_time_ns, std::uint32_t index,
+                                           const scene::Aabb& bounds, double slope) {
+    const double ground_m = height_under(instant, index, bounds);
+    if (!std::isfinite(ground_m)) return std::nullopt;
+    const glm::dvec3 size_m = bounds.max_m - bounds.min_m;
     constexpr double kSlackFrac = 0.05;
-    const std::string& name = scenario_.objects[index].name;
-    const double slack_m = std::max(0.02, kSlackFrac * size_m.z);
-    if (gap_m > slack_m && scenario_.objects[index].trajectory.empty()) {
-      add("ground", name, fmt::format("it floats {:.3g} m above what is under it", gap_m));
-    } else if (gap_m < -slack_m) {
-      add("ground", name,
-          fmt::format("it reaches {:.3g} m below what is under it, of {:.3g} m", -gap_m, size_m.z));
+    // What stands on a slope has ground beside it that is higher than its lowest wheel.
+    const double slack_m =
+        std::max(0.02, kSlackFrac * size_m.z) + 0.5 * slope * std::max(size_m.x, size_m.y);
+    return Footing{sim_time_ns, bounds.min_m.z - ground_m, slack_m};
+  }
+
+  void check_ground(std::uint32_t index, const scene::Aabb& bounds) {
+    const glm::dvec3 size_m = bounds.max_m - bounds.min_m;
+    if (is_flat(size_m) || scenario_.objects.size() < 2) return;
+    const scene::ObjectDesc& object = scenario_.objects[index];
+    if (!object.trajectory.empty()) {
+      check_path(index, size_m.z);
+      return;
+    }
+    const auto footing = footing_of(instant_, first_ns(scenario_), index, bounds, 0.0);
+    if (!footing) return;
+    if (footing->gap_m > footing->slack_m) {
+      add("ground", object.name,
+          fmt::format("it floats {:.3g} m above what is under it", footing->gap_m));
+    } else if (footing->gap_m < -footing->slack_m) {
+      add("ground", object.name,
+          fmt::format("it reaches {:.3g} m below what is under it, of {:.3g} m", -footing->gap_m,
+                      size_m.z));
+    }
+  }
+
+  /// Looks for ground along the way of an object. A vehicle that floats keeps its height above
+  /// ground, below its own height; an aircraft does not.
+  void check_path(std::uint32_t index, double height_m) {
+    const scene::ObjectDesc& object = scenario_.objects[index];
+    constexpr std::size_t kMostPlaces = 16;
+    const std::size_t keys = object.trajectory.size();
+    const std::size_t places = std::min(keys, kMostPlaces);
+    std::optional<Footing> lowest;
+    double highest_m = 0.0;
+    for (std::size_t place = 0; place < places; ++place) {
+      const std::size_t key = places == 1 ? 0 : place * (keys - 1) / (places - 1);
+      const std::int64_t sim_time_ns = object.trajectory[key].sim_time_ns;
+      const auto state = scene::trajectory_at(object.trajectory, sim_time_ns);
+      if (!state.on) continue;
+      const glm::dmat4 world_from_body = scene::world_from_body_matrix(state.pose);
+      scene::Aabb bounds;
+      for (const scene::Instance& instance : geometry_.instances) {
+        if (instance.object != index) continue;
+        bounds.add(scene::transformed(geometry_.meshes[instance.mesh].bounds,
+                                      world_from_body * instance.body_from_mesh));
+      }
+      const double up = std::clamp(glm::normalize(glm::dvec3(world_from_body[2])).z, -1.0, 1.0);
+      const auto footing =
+          footing_of(rays_.at(sim_time_ns), sim_time_ns, index, bounds, std::sqrt(1.0 - up * up));
+      if (!footing) continue;
+      if (!lowest || footing->gap_m < lowest->gap_m) lowest = footing;
+      highest_m = std::max(highest_m, footing->gap_m);
+    }
+    if (!lowest) return;
+    const double at_s = 1e-9 * static_cast<double>(lowest->sim_time_ns);
+    if (lowest->gap_m > lowest->slack_m && highest_m < height_m) {
+      add("ground", object.name,
+          fmt::format("it floats {:.3g} m above what is under it all along its trajectory",
+                      lowest->gap_m));
+    } else if (lowest->gap_m < -lowest->slack_m) {
+      add("ground", object.name,
+          fmt::format("it reaches {:.3g} m below what is under it at {:.3f} s of its trajectory",
+                      -lowest->gap_m, at_s));
     }
   }
 
@@ -260,6 +334,7 @@ class Check {
 
   const scene::ScenarioDesc& scenario_;
   const scene::SceneGeometry& geometry_;
+  const reference::RayScene& rays_;
   reference::SceneInstant instant_;
   SceneReport report_;
 };

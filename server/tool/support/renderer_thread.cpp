@@ -94,7 +94,7 @@ Result<TimedFrame> RendererThread::timed(const std::function<int(Clock::time_poi
     const auto index = static_cast<renderer::SlotIndex>(slot);
     const renderer::FrameView& view = renderer_->collect(index);
     out.frame_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-    out.coarse = view.stats.coarse;
+    out.coarse = view.stats.coarse.any();
     out.quality_level = view.quality_level;
     failed = view.device_failed;
     if (temperature_k != nullptr) {

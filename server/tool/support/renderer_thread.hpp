@@ -20,7 +20,7 @@ namespace emit::tool {
 /// Result of a frame, from submit() until its pixels are in memory.
 struct TimedFrame {
   double frame_ms = 0.0;
-  bool coarse = false;  ///< renderer::FrameStats::coarse
+  bool coarse = false;  ///< renderer::FrameStats::coarse has a reason
   std::uint8_t quality_level = 0;
 };
 

@@ -18,6 +18,8 @@ std::vector<std::string> pixel_report(const scene::ScenarioDesc& scenario,
   const float pixel_w_m2_sr = frame.radiance_w_m2_sr[band][i];
   const auto radiance_w_m2_sr = static_cast<double>(pixel_w_m2_sr);
   std::vector<std::string> lines;
+  // The report stays on the screen while time goes on or jumps.
+  const std::string at = fmt::format("at {:.3f} s", 1e-9 * static_cast<double>(frame.sim_time_ns));
   double normal_up = 1.0;
   if (std::isfinite(frame.depth_m[i])) {
     const ProbePoint point{.name = "", .kind = ProbePoint::Kind::pixel, .x_px = px.x, .y_px = px.y};
@@ -26,14 +28,14 @@ std::vector<std::string> pixel_report(const scene::ScenarioDesc& scenario,
     const glm::dvec3 ray = pixel_direction_body(scenario.sensor, px.x, px.y);
     const scene::ObjectDesc& object =
         scenario.objects[static_cast<std::size_t>(frame.object_id[i]) - 1];
-    lines.push_back(fmt::format("pixel {} {}  range {:.1f} m", px.x, px.y,
+    lines.push_back(fmt::format("pixel {} {}  {}  range {:.1f} m", px.x, px.y, at,
                                 static_cast<double>(frame.depth_m[i]) / ray.x));
     lines.push_back(fmt::format("object {}  material {}", object.name,
                                 finder.material_name(static_cast<std::size_t>(frame.material[i]))));
     lines.push_back(fmt::format("surface {:.2f} K  sun {:.2f}  sky {:.2f}", frame.temperature_k[i],
                                 frame.sun_cosine[i], frame.sky_frac[i]));
   } else {
-    lines.push_back(fmt::format("pixel {} {}  sky", px.x, px.y));
+    lines.push_back(fmt::format("pixel {} {}  {}  sky", px.x, px.y, at));
   }
   const physics::ApparentTemperature apparent(scene::spectral_band(scenario.bands[band]));
   lines.push_back(fmt::format("band {}  apparent {:.2f} K", scenario.bands[band].name,

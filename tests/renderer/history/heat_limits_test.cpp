@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "emit/physics/constants.hpp"
+#include "emit/renderer/coarse_reasons.hpp"
 #include "emit/scene/melting.hpp"
 #include "history/foster_history.hpp"
 #include "history/foster_setup.hpp"
@@ -144,6 +145,15 @@ TEST(HeatLimits, AreForgottenAfterSixHours) {
   EXPECT_EQ(limits_at(s, -3 * kLimitHourNs), "");
   EXPECT_EQ(limits_at(s, 5 * kLimitHourNs), "strong_wind ");
   EXPECT_EQ(limits_at(s, 12 * kLimitHourNs), "");
+}
+
+TEST(CoarseReasons, EachHasANameAndASentenceThatFitsTheLog) {
+  for (std::size_t i = 0; i < kCoarseReasons; ++i) {
+    const auto reason = static_cast<CoarseReason>(i);
+    EXPECT_FALSE(name_of(reason).empty());
+    EXPECT_GT(text_of(reason).size(), 20U);
+    EXPECT_LE(text_of(reason).size(), 85U) << text_of(reason);
+  }
 }
 
 TEST(HeatLimits, EachHasANameAndASentenceThatFitsTheLog) {

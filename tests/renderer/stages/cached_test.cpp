@@ -272,7 +272,7 @@ TEST(RendererCached, TheLimitOfSamplesIsKeptAndSaid) {
   request.sim_time_ns = request.thermal_time_ns = kHourNs;
   request.sensor_pose = looking({3.0, -9.0, 6.0}, {0.0, 0.0, 0.0});
   const int slot = run.renderer().submit(request);
-  EXPECT_TRUE(run.renderer().collect(static_cast<renderer::SlotIndex>(slot)).stats.coarse);
+  EXPECT_TRUE(run.renderer().collect(static_cast<renderer::SlotIndex>(slot)).stats.coarse.any());
   EXPECT_LE(run.renderer().scene_stats().samples, 300U);
   EXPECT_TRUE(run.renderer().scene_stats().samples_full);
   EXPECT_FALSE(run.renderer().scene_stats().coarse_meshes);
@@ -404,7 +404,7 @@ TEST(RendererCached, FramesFromWhereNoOneSaidTheCameraWouldBeAreFlagged) {
     request.sensor_pose = looking(from, {0.0, 0.0, 0.0});
     const int slot = run.renderer().submit(request);
     const auto& view = run.renderer().collect(static_cast<renderer::SlotIndex>(slot));
-    const bool coarse = view.stats.coarse;
+    const bool coarse = view.stats.coarse.any();
     run.renderer().release(static_cast<renderer::SlotIndex>(slot));
     return coarse;
   };

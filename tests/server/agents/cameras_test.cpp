@@ -121,7 +121,7 @@ TEST(Cameras, EachIsFlaggedForItself) {
   use_channels_of(rig, four_views());
   // The camera of the entity looks at a surface that was not prepared, and takes long.
   rig.script.on_submit = [&](const renderer::FrameRequest& request) {
-    rig.script.coarse = rig.script.submitted.size() == 3;
+    rig.script.coarse.set(0, rig.script.submitted.size() == 3);
     if (request.frame_number == 4) rig.clock.advance(4 * kMs);
   };
   rig.send(1, 0);

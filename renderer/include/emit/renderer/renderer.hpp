@@ -12,6 +12,7 @@
 
 #include "emit/physics/error.hpp"
 #include "emit/physics/frames.hpp"
+#include "emit/renderer/coarse_reasons.hpp"
 #include "emit/renderer/heat_limits.hpp"
 #include "emit/scene/scene_desc.hpp"
 
@@ -121,12 +122,9 @@ struct FrameStats {
   /// Poses from the host that were dropped since the last reset because the store of an entity was
   /// full. Shade of the distant past is coarser than it was sent.
   std::uint64_t dropped_poses = 0;
-  /// The frame may be coarser than asked (thermal.method = "cached"). The camera is where nobody
-  /// planned it, or samples ran out before its view was fine enough: triangles may be wider than
-  /// pixels and shadows coarser than thermal.tolerance_k. The flag is also set while some surfaces
-  /// have not taken in a change of the weather or of an entity's shade, while heat along surfaces
-  /// near edges is not settled to 0.05 K, and in a frame that prepared the surface anew (rewarm_s).
-  bool coarse = false;
+  /// Reasons why the frame may be coarser than asked (thermal.method = "cached"): triangles may be
+  /// wider than pixels, and temperatures further off than thermal.tolerance_k. None: it is not.
+  CoarseReasons coarse;
   /// Small targets without a window of their own, because a frame has no more windows or its draws
   /// fill their memory. They have one sample per pixel, so their energy is not kept.
   std::uint32_t plain_targets = 0;

@@ -60,23 +60,46 @@ TEST(Conductor, CountsJournalLinesThatFindNoRoomAndKeepsOnSendingFrames) {
   EXPECT_GT(rig.count(Counter::journal_dropped), 0U);
 }
 
-TEST(RenderAgent, FramesOfASurfaceThatIsTooCoarseAreDegradedAndCounted) {
-  Rig rig;
-  rig.send(1, 1);
-  rig.settle();
-  rig.script.coarse = true;
-  rig.send(2, 2);
-  rig.settle();
-  rig.script.coarse = false;
-  rig.send(3, 3);
-  rig.settle();
-  ASSERT_EQ(rig.frames.size(), 3U);
-  for (const std::size_t i : {0U, 1U, 2U}) {
-    const bool degraded = (rig.frames[i].header.flags & protocol::kFlagDegraded) != 0U;
-    EXPECT_EQ(degraded, i == 1U);
-    EXPECT_EQ(std::isnan(rig.frames[i].header.estimated_error_k), i == 1U);
+TEST(RenderAgent, FramesOfASurfaceThatIsTooCoarseAreDegradedAndCountedByReasonAndToldOnce) {
+  const Counter counters[] = {Counter::frames_coarse_camera,  Counter::frames_coarse_fov,
+                              Counter::frames_coarse_samples, Counter::frames_coarse_meshes,
+                              Counter::frames_coarse_shade,   Counter::frames_coarse_shadows,
+                              Counter::frames_coarse_weather, Counter::frames_coarse_edges};
+  // A frame that warms up again is told by an event of its own.
+  ASSERT_EQ(std::size(counters) + 1, renderer::kCoarseReasons);
+  for (std::size_t reason = 0; reason < renderer::kCoarseReasons; ++reason) {
+    SCOPED_TRACE(reason);
+    Rig rig;
+    rig.send(1, 1);
+    rig.settle();
+    rig.script.coarse.set(reason);
+    rig.send(2, 2);
+    rig.settle();
+    rig.send(3, 3);
+    rig.settle();
+    rig.script.coarse.reset();
+    rig.send(4, 4);
+    rig.settle();
+    ASSERT_EQ(rig.frames.size(), 4U);
+    for (std::size_t i = 0; i < 4; ++i) {
+      const bool coarse = i == 1 || i == 2;
+      EXPECT_EQ((rig.frames[i].header.flags & protocol::kFlagDegraded) != 0U, coarse);
+      EXPECT_EQ(std::isnan(rig.frames[i].header.estimated_error_k), coarse);
+    }
+    EXPECT_EQ(rig.count(Counter::frames_coarse), 2U);
+    for (std::size_t i = 0; i < std::size(counters); ++i) {
+      EXPECT_EQ(rig.count(counters[i]), i == reason ? 2U : 0U) << i;
+    }
+    auto& events = rig.context().render_events.ring();
+    if (reason < std::size(counters)) {
+      ASSERT_NE(events.front(), nullptr);
+      const std::string sentence(renderer::text_of(static_cast<renderer::CoarseReason>(reason)));
+      EXPECT_NE(describe(*events.front()).text.find("event=coarse why=\"" + sentence + "\""),
+                std::string::npos);
+      events.pop();
+    }
+    EXPECT_EQ(events.front(), nullptr);
   }
-  EXPECT_EQ(rig.count(Counter::frames_coarse), 1U);
 }
 
 TEST(RenderAgent, EachLimitOfTheHeatIsCountedByItsNameAndToldOnceInARun) {

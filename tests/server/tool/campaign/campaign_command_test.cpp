@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -139,6 +142,23 @@ TEST(CliCampaign, a_file_that_changes_meanwhile_is_named_as_the_reason) {
   EXPECT_NE(campaign.err().find("of other conditions or of another version"), std::string::npos)
       << campaign.err();
   EXPECT_EQ(campaign.err().find("ended without a word"), std::string::npos) << campaign.err();
+}
+
+TEST(CliCampaign, two_campaigns_do_not_share_a_folder) {
+  const TemporaryFolder folder;
+  write_text(folder.file("c.toml"), std::string(kHead) + "[truth]\nkind = \"none\"\n");
+  std::filesystem::create_directories(folder.file("o"));
+  const int other = ::open(folder.file("o/campaign.lock").c_str(), O_RDWR | O_CREAT, 0644);
+  ASSERT_GE(other, 0);
+  ASSERT_EQ(::flock(other, LOCK_EX | LOCK_NB), 0);
+  const ProcessResult refused =
+      run_emit({"campaign", folder.file("c.toml"), "--out", folder.file("o")});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_NE(refused.err.find("campaign.lock: another campaign runs in this folder"),
+            std::string::npos)
+      << refused.err;
+  EXPECT_TRUE(std::filesystem::is_empty(folder.file("o/elements")));
+  ::close(other);
 }
 
 TEST(CliCampaign, a_wrong_key_is_found_before_anything_runs) {

@@ -148,6 +148,24 @@ TEST(CliScene, a_check_names_what_is_wrong) {
   EXPECT_NE(finding({}, {"--set", "object[car].position_m=[0,0,-0.5]"})
                 .find("ground: car: it reaches 0.5 m below"),
             std::string::npos);
+  // The same of one that drives: it keeps its height. One that climbs is an aircraft.
+  const TemporaryFolder paths;
+  const auto path = [&paths](const char* name, double from_m, double to_m) {
+    write_text(paths.file(name), "time_s,x_m,y_m,z_m,heading_deg,pitch_deg,roll_deg\n0,-2,0," +
+                                     std::to_string(from_m) + ",0,0,0\n10,2,0," +
+                                     std::to_string(to_m) + ",0,0,0\n");
+    return "object[car].trajectory_file=\"" + paths.file(name) + "\"";
+  };
+  EXPECT_NE(finding({}, {"--set", "object[car].entity_id=7", "--set", path("over.csv", 0.4, 0.4)})
+                .find("ground: car: it floats 0.4 m above what is under it all along"),
+            std::string::npos);
+  EXPECT_NE(finding({}, {"--set", "object[car].entity_id=7", "--set", path("into.csv", 0.0, -0.3)})
+                .find("ground: car: it reaches 0.3 m below what is under it at 10.000 s"),
+            std::string::npos);
+  EXPECT_EQ(finding({.inside_out = true},
+                    {"--set", "object[car].entity_id=7", "--set", path("climb.csv", 0.4, 30.0)})
+                .find("ground: car"),
+            std::string::npos);
   EXPECT_NE(finding({.inside_out = true}, {}).find("faces: car: 100 % of the faces"),
             std::string::npos);
   EXPECT_NE(finding({.material = "red"}, {}).find("material: car: glTF material 'red' is mapped"),
