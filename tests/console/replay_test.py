@@ -74,7 +74,14 @@ class Replay(unittest.TestCase):
         return number
 
     def place_of(self, frame):
-        """Returns the place of a frame on the bar, in the window."""
+        """Returns the place of a frame on the bar, in the window, once the page has stopped to move it."""
+        place, before = self.place_now(frame), None
+        while place != before:
+            self.page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+            place, before = self.place_now(frame), place
+        return place
+
+    def place_now(self, frame):
         return self.page.evaluate(
             f"(() => {{ const bar = emitConsole.replay; const box = document.querySelector('#replay-bar')"
             f".getBoundingClientRect(); return [box.left + bar.placeOf(bar.recording.times[{frame}][0]) - 0.4,"
@@ -125,8 +132,12 @@ class Replay(unittest.TestCase):
     def test_a_step_a_rate_and_a_loop(self):
         with replay_console(self.daemon.journal, SCENARIO, self.daemon.overrides, "--speed", "0.01") as address:
             self.open(address)
+            # A toast goes after some seconds, and a busy machine may look too late.
+            self.page.evaluate("(() => { window.toasts = ''; new MutationObserver(() => window.toasts += "
+                               "document.querySelector('#toast').textContent).observe(document.querySelector('#toast'), "
+                               "{childList: true, characterData: true, subtree: true}); })()")
             self.page.press("n")
-            self.page.wait_for("document.querySelector('#toast').textContent.includes('hold or stop')", PATIENCE_S)
+            self.page.wait_for("window.toasts.includes('hold or stop')", PATIENCE_S)
             self.hold()
             before = self.page.evaluate(SHOWN)
             self.page.press("n")
