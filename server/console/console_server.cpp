@@ -17,6 +17,7 @@
 
 #include "console/console_message.hpp"
 #include "console/console_session.hpp"
+#include "emit/protocol/control.hpp"
 #include "net/connection_acceptor.hpp"
 #include "net/ip_address.hpp"
 
@@ -29,22 +30,6 @@ using boost::system::error_code;
 
 constexpr std::chrono::milliseconds kStatusPeriod{200};
 constexpr int kNice = 10;
-
-std::string_view name_of(CommandKind command) noexcept {
-  switch (command) {
-    case CommandKind::start:
-      return "start";
-    case CommandKind::stop:
-      return "stop";
-    case CommandKind::hold:
-      return "hold";
-    case CommandKind::step:
-      return "step";
-    case CommandKind::reset:
-      break;
-  }
-  return "reset";
-}
 
 }  // namespace
 
@@ -150,10 +135,10 @@ struct ConsoleServer::Impl {
 
   void take_replies() {
     while (const StatusReply* reply = context.console_replies.front()) {
-      const auto command = static_cast<CommandKind>(reply->detail);
-      const auto text = std::make_shared<const std::string>(fmt::format(
-          R"({{"type":"answer","ok":{},"command":"{}","text":{}}})", reply->code == StatusCode::ok,
-          name_of(command), json_string(protocol::status_text(reply->code, reply->detail))));
+      const auto text = std::make_shared<const std::string>(
+          fmt::format(R"({{"type":"answer","ok":{},"command":"{}","text":{}}})",
+                      reply->code == StatusCode::ok, protocol::command_name(reply->detail),
+                      json_string(protocol::status_text(reply->code, reply->detail))));
       for (ConsoleSession* page : std::vector(hub.pages.begin(), hub.pages.end())) {
         if (page->page() == reply->origin.connection) page->give_answer(text);
       }

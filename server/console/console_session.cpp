@@ -16,6 +16,7 @@
 #include "console/console_access.hpp"
 #include "console/console_files.hpp"
 #include "console/console_message.hpp"
+#include "emit/protocol/control.hpp"
 
 namespace emit::server {
 namespace {
@@ -30,13 +31,6 @@ using Request = http::request<http::empty_body>;
 using Response = http::response<http::string_body>;
 
 constexpr std::size_t kMaxAnswers = 64;
-
-constexpr std::array<std::pair<std::string_view, CommandKind>, 5> kCommands{
-    {{"start", CommandKind::start},
-     {"stop", CommandKind::stop},
-     {"hold", CommandKind::hold},
-     {"step", CommandKind::step},
-     {"reset", CommandKind::reset}}};
 
 std::string_view view(beast::string_view text) {
   return {text.data(), text.size()};
@@ -240,12 +234,11 @@ void ConsoleSession::say_answer(bool ok, std::string_view command, std::string_v
 }
 
 void ConsoleSession::take_command(std::string_view word) {
-  for (const auto& [name, command] : kCommands) {
-    if (name != word) continue;
-    const std::string refusal = hub_.answers.command(command, local_, page_);
-    if (!refusal.empty()) say_answer(false, name, refusal);
-    return;
-  }
+  const auto named = std::ranges::find(protocol::kCommandNames, word);
+  if (named == protocol::kCommandNames.begin() || named == protocol::kCommandNames.end()) return;
+  const auto command = static_cast<CommandKind>(named - protocol::kCommandNames.begin());
+  const std::string refusal = hub_.answers.command(command, local_, page_);
+  if (!refusal.empty()) say_answer(false, *named, refusal);
 }
 
 void ConsoleSession::give_image(ConsoleBytes image) {

@@ -157,9 +157,7 @@ EventText unknown() {
 }
 
 EventText describe_command(const Event& event) {
-  static constexpr std::array kNames{"unspecified", "start", "stop", "hold", "step", "reset"};
-  return info(
-      fmt::format("event=command kind={}", event.a < kNames.size() ? kNames[event.a] : "?"));
+  return info(fmt::format("event=command kind={}", protocol::command_name(event.a)));
 }
 
 /// Returns the text of an event about one connection.

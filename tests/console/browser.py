@@ -2,6 +2,7 @@
 """Headless Chromium, driven over its DevTools protocol. It notes every request that the page makes."""
 import asyncio
 import json
+import os
 import pathlib
 import shutil
 import subprocess
@@ -131,6 +132,18 @@ class Browser:
     def screenshot(self, path):
         import base64
         pathlib.Path(path).write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"]))
+
+    def keep(self, name, sizes_px=()):
+        """Leaves pictures of the page, at its own size or at these, in the folder that TEST_PICTURES names, if any."""
+        folder = os.environ.get("TEST_PICTURES")
+        if not folder:
+            return
+        if not sizes_px:
+            self.screenshot(f"{folder}/{name}.png")
+        for width_px, height_px in sizes_px:
+            self.resize(width_px, height_px)
+            self.evaluate("new Promise((done) => setTimeout(done, 600))")
+            self.screenshot(f"{folder}/{name}_{width_px}.png")
 
     def close(self):
         if getattr(self, "_socket", None) is not None:

@@ -14,7 +14,6 @@ if browser.program() is None:
     skip.skip("Chromium is not installed; Debian's package is chromium")
 
 import math  # noqa: E402
-import os  # noqa: E402
 import struct  # noqa: E402
 import time  # noqa: E402
 import unittest  # noqa: E402
@@ -226,14 +225,8 @@ class Console(unittest.TestCase):
                     "for (let i = 0; i < d.length; i += 4) seen.add(d[i] << 16 | d[i + 1] << 8 | d[i + 2]);"
                     "return seen.size; })()")
                 self.assertGreater(colors, 8, canvas)
-            self.keep("axes")
+            self.page.keep("axes")
             self.assert_stays_on_this_machine(daemon)
-
-    def keep(self, name):
-        """Leaves a picture of the page in the folder that TEST_PICTURES names, if it names one."""
-        folder = os.environ.get("TEST_PICTURES")
-        if folder:
-            self.page.screenshot(f"{folder}/{name}.png")
 
     def test_a_page_that_does_not_draw_costs_a_stream_no_frame(self):
         with start(IG_CLOCK) as daemon, FrameClient.connect(daemon.tcp_url) as client:

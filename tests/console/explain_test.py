@@ -13,7 +13,6 @@ if browser.program() is None:
     skip.skip("Chromium is not installed; Debian's package is chromium")
 
 import json  # noqa: E402
-import os  # noqa: E402
 import subprocess  # noqa: E402
 import unittest  # noqa: E402
 
@@ -64,7 +63,7 @@ class Explain(unittest.TestCase):
             self.assertGreater(shown[0], 20)
             self.assertIn("block_on_road", shown[1])
             self.assertGreaterEqual(shown[2], 4)
-            self.keep("explain")
+            self.page.keep("explain", ((1024, 768), (1920, 1080)))
             # By the keyboard: it closes, opens again without a further question, and goes with its probe.
             self.page.press("Escape")
             self.page.wait_for("document.querySelector('#explain').hidden", PATIENCE_S)
@@ -99,14 +98,6 @@ class Explain(unittest.TestCase):
             self.assertTrue(self.page.evaluate("document.querySelector('#explain').hidden"), "a probe is put as ever")
             self.page.press("e")
             self.page.wait_for("document.querySelector('#explain-state').textContent.includes('rendered scenes')", PATIENCE_S)
-
-    def keep(self, name):
-        """Leaves pictures of the page in the folder that TEST_PICTURES names, if it names one."""
-        folder = os.environ.get("TEST_PICTURES")
-        for width_px, height_px in ((1024, 768), (1920, 1080)) if folder else ():
-            self.page.resize(width_px, height_px)
-            self.page.evaluate("new Promise((done) => setTimeout(done, 600))")
-            self.page.screenshot(f"{folder}/{name}_{width_px}.png")
 
 
 if __name__ == "__main__":

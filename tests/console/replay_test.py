@@ -14,7 +14,6 @@ if browser.program() is None:
 
 import json  # noqa: E402
 import math  # noqa: E402
-import os  # noqa: E402
 import subprocess  # noqa: E402
 import unittest  # noqa: E402
 
@@ -124,7 +123,7 @@ class Replay(unittest.TestCase):
             mouse("mouseReleased", x, clickCount=1)
             self.page.wait_for(f"{SHOWN} >= 10 && {SHOWN} <= 12 && {STATE}.frame === {SHOWN} - 1", PATIENCE_S)
             self.assert_is_recorded()
-            self.keep("replay")
+            self.page.keep("replay", ((1024, 768), (1920, 1080)))
             self.assertEqual(self.page.errors, [])
             own = (f"http://{address}/", f"ws://{address}/", "about:", "data:")
             self.assertEqual([url for url in self.page.requests if not url.startswith(own)], [])
@@ -179,14 +178,6 @@ class Replay(unittest.TestCase):
              "0.0.0.0:0"], capture_output=True, text=True, timeout=PATIENCE_S)
         self.assertEqual(refused.returncode, 2)
         self.assertIn("other hosts may reach it", refused.stderr)
-
-    def keep(self, name):
-        """Leaves pictures of the page in the folder that TEST_PICTURES names, if it names one."""
-        folder = os.environ.get("TEST_PICTURES")
-        for width_px, height_px in ((1024, 768), (1920, 1080)) if folder else ():
-            self.page.resize(width_px, height_px)
-            self.page.evaluate("new Promise((done) => setTimeout(done, 600))")
-            self.page.screenshot(f"{folder}/{name}_{width_px}.png")
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@
 #include <cctype>
 #include <vector>
 
+#include "emit/protocol/control.hpp"
 #include "emit/protocol/convert.hpp"
 #include "emit/protocol/frame_header.hpp"
 #include "emit/protocol/record/pose_pcap.hpp"
@@ -86,23 +87,6 @@ void put_view(CsvFile& file, const v1::HostFrame& frame) {
   }
   const v1::Gimbal& gimbal = frame.gimbal();
   file.number(gimbal.yaw_rad()).number(gimbal.pitch_rad()).number(gimbal.roll_rad());
-}
-
-std::string_view name_of(v1::Command::Kind kind) {
-  switch (kind) {
-    case v1::Command::KIND_START:
-      return "start";
-    case v1::Command::KIND_STOP:
-      return "stop";
-    case v1::Command::KIND_HOLD:
-      return "hold";
-    case v1::Command::KIND_STEP:
-      return "step";
-    case v1::Command::KIND_RESET:
-      return "reset";
-    default:
-      return "unknown";
-  }
 }
 
 /// Place at which a host frame was found.
@@ -292,7 +276,9 @@ class Exporter {
     if (file == nullptr) return;
     file->text("command");
     put_run(*file);
-    file->whole(entry.sequence()).whole(log_time_ns).text(name_of(entry.command().kind()));
+    file->whole(entry.sequence())
+        .whole(log_time_ns)
+        .text(command_name(static_cast<std::uint64_t>(entry.command().kind())));
     file->empty(8).end_row();
   }
 

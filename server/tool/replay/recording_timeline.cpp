@@ -4,22 +4,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <iterator>
 
+#include "emit/protocol/control.hpp"
 #include "emit/protocol/frame_header.hpp"
 #include "emit/protocol/record/log.hpp"
 #include "emit/v1/control.pb.h"
 #include "tool/support/interrupt.hpp"
 
 namespace emit::tool {
-namespace {
-
-constexpr std::array<std::string_view, 6> kCommandNames{"?",    "start", "stop",
-                                                        "hold", "step",  "reset"};
-
-}  // namespace
-
 physics::Result<RecordingTimeline> RecordingTimeline::read(const std::filesystem::path& log,
                                                            std::size_t first_run,
                                                            std::size_t last_run) {
@@ -55,8 +48,8 @@ void RecordingTimeline::add(const v1::JournalEntry& entry) {
     runs_.push_back({entry.run_start().run_id(), frames_.size()});
     mark("run", fmt::format("run {}", entry.run_start().run_id()));
   } else if (entry.has_command()) {
-    const auto kind = static_cast<std::size_t>(entry.command().kind());
-    mark("command", std::string(kCommandNames[kind < kCommandNames.size() ? kind : 0]));
+    mark("command",
+         std::string(protocol::command_name(static_cast<std::uint64_t>(entry.command().kind()))));
   } else if (entry.has_host_frame()) {
     if (entry.host_frame().has_environment()) mark("weather", "weather of the host");
     if (entry.host_frame().parts_size() > 0) mark("part", "a part is driven");

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <array>
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 /// Enumerations of the control connection, with the values of the Protobuf messages in
 /// proto/emit/v1. Every program that speaks the protocol uses these.
@@ -12,6 +14,13 @@ enum class PeerRole : std::uint8_t { none = 0, host = 1, client = 2, recorder = 
 
 /// Command of a host, with the values of emit.v1.Command.Kind.
 enum class CommandKind : std::uint8_t { start = 1, stop = 2, hold = 3, step = 4, reset = 5 };
+/// Names of the commands in outputs, by value; the first one is no command.
+inline constexpr std::array<std::string_view, 6> kCommandNames{"unknown", "start", "stop",
+                                                               "hold",    "step",  "reset"};
+/// Returns the name of a command; "unknown" for a number that is none. RT-safe.
+[[nodiscard]] constexpr std::string_view command_name(std::uint64_t kind) noexcept {
+  return kCommandNames[kind < kCommandNames.size() ? kind : 0];
+}
 
 /// Answer to a message of a peer, with the values of emit.v1.Status.Code.
 enum class StatusCode : std::uint8_t {
