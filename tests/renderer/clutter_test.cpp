@@ -361,6 +361,22 @@ TEST(Clutter, StateFileGivesTheSamePicture) {
   std::filesystem::remove(s.thermal.state_file);
 }
 
+TEST(Clutter, MaterialsOfOneFieldShareItAndTooManyFieldsAreRefused) {
+  scene::ScenarioDesc s = varied_ground(both());
+  constexpr std::size_t kMaterials = 12;
+  while (s.materials.size() < kMaterials) {
+    s.materials.push_back(s.materials.front());
+    s.materials.back().name = "varied " + std::to_string(s.materials.size());
+    s.materials.back().clutter->inertia_sd_ln = 0.01 * static_cast<double>(s.materials.size());
+  }
+  Eye eye(s);
+  for (std::size_t m = 0; m < kMaterials; ++m) s.materials[m].clutter->seed = 100 + m;
+  const auto refused = renderer::Renderer::create(s, {}, {});
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().text.find("12 different fields: 8 are possible"), std::string::npos)
+      << refused.error().text;
+}
+
 TEST(Clutter, ShadeThatCameAndWentLeavesWhatAWarmUpLeaves) {
   // A vehicle leaves; the clutter of its print goes on in short steps.
   scene::Clutter clutter = both();
