@@ -362,14 +362,21 @@ TEST(Clutter, StateFileGivesTheSamePicture) {
 }
 
 TEST(Clutter, MaterialsOfOneFieldShareItAndTooManyFieldsAreRefused) {
-  scene::ScenarioDesc s = varied_ground(both());
+  scene::ScenarioDesc s = varied_ground(both(), 2.0);
   constexpr std::size_t kMaterials = 12;
   while (s.materials.size() < kMaterials) {
+    const auto number = static_cast<double>(s.materials.size());
     s.materials.push_back(s.materials.front());
     s.materials.back().name = "varied " + std::to_string(s.materials.size());
-    s.materials.back().clutter->inertia_sd_ln = 0.01 * static_cast<double>(s.materials.size());
+    s.materials.back().clutter->inertia_sd_ln = 0.01 * number;
+    s.objects.push_back(s.objects.front());
+    s.objects.back().name = s.objects.back().material = s.materials.back().name;
+    s.objects.back().instances.front().position_world_m = {10.0 * number, 0.0, 0.0};
   }
-  Eye eye(s);
+  {
+    const auto shared = renderer::Renderer::create(s, {}, {});
+    EXPECT_TRUE(shared) << shared.error().text;
+  }
   for (std::size_t m = 0; m < kMaterials; ++m) s.materials[m].clutter->seed = 100 + m;
   const auto refused = renderer::Renderer::create(s, {}, {});
   ASSERT_FALSE(refused);

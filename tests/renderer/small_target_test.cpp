@@ -326,7 +326,8 @@ TEST(SmallTarget, MoreThanTheWindowsHoldStayInTheImage) {
 TEST(SmallTarget, TheShadowOfABodyThatFliesHighLiesWhereTheSunSays) {
   // A plate of 8 m flies 120 m above the ground, beside the picture; its umbra is 6 m wide.
   constexpr double kUpM = 120.0;
-  scene::ScenarioDesc s = test::cached_scenario(test::write_quads("still", {test::ground(300.0, 300.0)}));
+  scene::ScenarioDesc s =
+      test::cached_scenario(test::write_quads("still", {test::ground(300.0, 300.0)}));
   s.sensor.fov_h_rad = 0.2;
   s.materials[0].prescribed_k = kGroundK;
   scene::ObjectDesc object = s.objects.front();
@@ -343,7 +344,9 @@ TEST(SmallTarget, TheShadowOfABodyThatFliesHighLiesWhereTheSunSays) {
   const auto made = renderer::Renderer::create(s, {}, output);
   ASSERT_TRUE(made) << made.error().text;
   renderer::FrameRequest request;
-  request.sensor_pose = {{0.0, 0.0, 100.0}, physics::world_from_body_heading_pitch_roll(0.0, -0.5 * physics::kPi, 0.0)};
+  request.sensor_pose = {
+      {0.0, 0.0, 100.0},
+      physics::world_from_body_heading_pitch_roll(0.0, -0.5 * physics::kPi, 0.0)};
   const int slot = (*made)->submit(request);
   const auto& view = (*made)->collect(static_cast<renderer::SlotIndex>(slot));
   const auto cosine_at = [&](std::uint32_t x, std::uint32_t y) {
