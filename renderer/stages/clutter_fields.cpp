@@ -14,6 +14,12 @@
 namespace emit::renderer {
 namespace {
 
+/// True when two materials vary by the same field, whatever it changes of each.
+bool same_field(const scene::Clutter& a, const scene::Clutter& b) noexcept {
+  return a.shortest_m == b.shortest_m && a.longest_m == b.longest_m && a.slope == b.slope &&
+         a.seed == b.seed;
+}
+
 static_assert(scene::Clutter::kSide == EMIT_CLUTTER_SIDE);
 constexpr std::size_t kSide = EMIT_CLUTTER_SIDE;
 constexpr std::size_t kColumns = kSide + kSide / 4 * 3;
@@ -62,8 +68,12 @@ physics::Result<ClutterFields> ClutterFields::build(std::span<const scene::Mater
   for (const scene::Material& material : materials) {
     DrawnClutter& drawn = out.drawn_.emplace_back();
     if (!material.clutter) continue;
-    fields.push_back(&*material.clutter);
-    drawn.field = static_cast<std::uint32_t>(fields.size());
+    // Materials of one field share it.
+    const auto known = std::ranges::find_if(fields, [&material](const scene::Clutter* field) {
+      return same_field(*field, *material.clutter);
+    });
+    drawn.field = static_cast<std::uint32_t>(known - fields.begin()) + 1;
+    if (known == fields.end()) fields.push_back(&*material.clutter);
     drawn.tiles_per_m = 1.0 / material.clutter->period_m();
     drawn.heat = scene::varies_in_heat(material);
     out.emissivity_ = out.emissivity_ || material.clutter->emissivity_sd_frac != 0.0 ||
@@ -72,8 +82,8 @@ physics::Result<ClutterFields> ClutterFields::build(std::span<const scene::Mater
   if (fields.empty()) return out;
   if (fields.size() > kMost) {
     return physics::make_error(physics::ErrorCode::config,
-                               fmt::format("[[clutter]]: {} materials of the scene vary: {} are "
-                                           "possible",
+                               fmt::format("[[clutter]]: the materials of the scene vary by {} "
+                                           "different fields: {} are possible",
                                            fields.size(), kMost));
   }
   out.texture_ = gl::Texture(GL_RG32UI, static_cast<GLsizei>(kColumns),

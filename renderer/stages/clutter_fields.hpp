@@ -15,10 +15,11 @@ namespace emit::renderer {
 /// only, the rest is RT-safe.
 class ClutterFields {
  public:
-  /// Largest number of materials with clutter: every OpenGL 4.5 device takes textures that high.
+  /// Largest number of different fields: every OpenGL 4.5 device takes textures that high.
   static constexpr std::size_t kMost = 16384 / (2 * EMIT_CLUTTER_SIDE);
 
-  /// Makes the field of each material with clutter. Errors: config (more than kMost of them).
+  /// Makes the field of each material with clutter. Materials of the same field share it. Errors:
+  /// config (more than kMost different fields).
   [[nodiscard]] static physics::Result<ClutterFields> build(
       std::span<const scene::Material> materials);
 

@@ -361,6 +361,29 @@ TEST(Clutter, StateFileGivesTheSamePicture) {
   std::filesystem::remove(s.thermal.state_file);
 }
 
+TEST(Clutter, MaterialsOfOneFieldShareItAndTooManyFieldsAreRefused) {
+  scene::ScenarioDesc s = varied_ground(both(), 2.0);
+  constexpr std::size_t kMaterials = 12;
+  while (s.materials.size() < kMaterials) {
+    const auto number = static_cast<double>(s.materials.size());
+    s.materials.push_back(s.materials.front());
+    s.materials.back().name = "varied " + std::to_string(s.materials.size());
+    s.materials.back().clutter->inertia_sd_ln = 0.01 * number;
+    s.objects.push_back(s.objects.front());
+    s.objects.back().name = s.objects.back().material = s.materials.back().name;
+    s.objects.back().instances.front().position_world_m = {10.0 * number, 0.0, 0.0};
+  }
+  {
+    const auto shared = renderer::Renderer::create(s, {}, {});
+    EXPECT_TRUE(shared) << shared.error().text;
+  }
+  for (std::size_t m = 0; m < kMaterials; ++m) s.materials[m].clutter->seed = 100 + m;
+  const auto refused = renderer::Renderer::create(s, {}, {});
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().text.find("12 different fields: 8 are possible"), std::string::npos)
+      << refused.error().text;
+}
+
 TEST(Clutter, ShadeThatCameAndWentLeavesWhatAWarmUpLeaves) {
   // A vehicle leaves; the clutter of its print goes on in short steps.
   scene::Clutter clutter = both();

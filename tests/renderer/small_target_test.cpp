@@ -323,5 +323,41 @@ TEST(SmallTarget, MoreThanTheWindowsHoldStayInTheImage) {
   EXPECT_NEAR(sky.energy(plates) / sum, 1.0, 0.01);
 }
 
+TEST(SmallTarget, TheShadowOfABodyThatFliesHighLiesWhereTheSunSays) {
+  // A plate of 8 m flies 120 m above the ground, beside the picture; its umbra is 6 m wide.
+  constexpr double kUpM = 120.0;
+  scene::ScenarioDesc s =
+      test::cached_scenario(test::write_quads("still", {test::ground(300.0, 300.0)}));
+  s.sensor.fov_h_rad = 0.2;
+  s.materials[0].prescribed_k = kGroundK;
+  scene::ObjectDesc object = s.objects.front();
+  object.name = "plate";
+  object.gltf = test::write_quads("plate", {test::ground(0.5, 0.5)}, true);
+  object.entity_id = 1;
+  object.scale = 8.0;
+  const glm::dvec3 sun = test::to_sun(s, 0.0);
+  ASSERT_GT(sun.z, 0.3);
+  object.instances.front().position_world_m = kUpM / sun.z * sun;
+  s.objects.push_back(object);
+  renderer::OutputOptions output;
+  output.sun = true;
+  const auto made = renderer::Renderer::create(s, {}, output);
+  ASSERT_TRUE(made) << made.error().text;
+  renderer::FrameRequest request;
+  request.sensor_pose = {
+      {0.0, 0.0, 100.0},
+      physics::world_from_body_heading_pitch_roll(0.0, -0.5 * physics::kPi, 0.0)};
+  const int slot = (*made)->submit(request);
+  const auto& view = (*made)->collect(static_cast<renderer::SlotIndex>(slot));
+  const auto cosine_at = [&](std::uint32_t x, std::uint32_t y) {
+    return view.sun_cosine[std::size_t{y} * kWidth + x];
+  };
+  EXPECT_NEAR(cosine_at(kWidth / 2, kHeight / 2), 0.0, 1e-3);
+  for (const auto& [x, y] : {std::pair(1U, 1U), std::pair(kWidth - 2, kHeight - 2)}) {
+    EXPECT_NEAR(cosine_at(x, y), sun.z, 1e-3);
+  }
+  (*made)->release(static_cast<renderer::SlotIndex>(slot));
+}
+
 }  // namespace
 }  // namespace emit

@@ -3,6 +3,9 @@
 #include "shared/frame_params.glsl.h"
 #include "passes/octahedral.glsl"
 #include "passes/surface_texel.glsl"
+#ifdef EMIT_CLUTTER
+#include "passes/short_floats.glsl"
+#endif
 
 layout(std140, binding = EMIT_BIND_DRAW) uniform Draw { DrawParams draw; };
 
@@ -45,12 +48,12 @@ uvec4 packed_clutter() {
   float apart = 0.5 * (along_x - along_y);
   float longer2 = max(0.5 * (along_x + along_y) + sqrt(apart * apart + mixed * mixed), 1e-20);
   vec2 axis = apart >= 0.0 ? vec2(longer2 - along_y, mixed) : vec2(mixed, longer2 - along_x);
-  float axis_length = length(axis);
-  vec2 longer = sqrt(longer2) * (axis_length > 0.0 ? axis / axis_length : vec2(1.0, 0.0));
+  float axis2 = dot(axis, axis);
+  vec2 longer = axis2 > 0.0 ? axis * sqrt(longer2 / axis2) : vec2(sqrt(longer2), 0.0);
   float width_frac = min(abs(a.x * b.y - a.y * b.x) / longer2, 1.0);
   uvec2 steps = uvec2(fract(place) * EMIT_CLUTTER_PLACE_STEPS) << 8;
   return uvec4(steps.x | uint(width_frac * 255.0 + 0.5), steps.y | draw.field,
-               packHalf2x16(clamp(longer, -60000.0, 60000.0)), packHalf2x16(clutter_k));
+               packed_short_floats(longer), packed_short_floats(clutter_k));
 }
 #endif
 

@@ -56,7 +56,7 @@ CachedSurface::CachedSurface(const scene::ScenarioDesc& scenario, SurfaceGeometr
       grid_(grid_of(scenario.thermal)),
       workers_(threads::WorkerPool::all_cores()),
       interval_(geometry_, heat_),
-      entity_shadows_(geometry_.entity_boxes_m()) {}
+      entity_shadows_(geometry_.entity_boxes_m(), geometry_.highest_static_m()) {}
 
 physics::Result<std::unique_ptr<CachedSurface>> CachedSurface::create(
     const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,

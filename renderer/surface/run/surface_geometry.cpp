@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <utility>
 
 namespace emit::renderer {
@@ -49,6 +50,16 @@ std::vector<scene::Aabb> SurfaceGeometry::entity_boxes_m() const {
         scene::transformed(geometry_.meshes[instance.mesh].bounds, instance.body_from_mesh));
   }
   return boxes;
+}
+
+float SurfaceGeometry::highest_static_m() const {
+  double highest_m = -std::numeric_limits<double>::infinity();
+  for (const scene::Instance& instance : geometry_.instances) {
+    const scene::Aabb& box = geometry_.meshes[instance.mesh].bounds;
+    if (entity_of_object_[instance.object] >= 0 || box.empty()) continue;
+    highest_m = std::max(highest_m, scene::transformed(box, instance.world_from_mesh).max_m.z);
+  }
+  return static_cast<float>(highest_m - rays().origin_world_m().z);
 }
 
 std::vector<float> SurfaceGeometry::entity_radii_m() const {

@@ -37,6 +37,8 @@ class SurfaceGeometry {
   [[nodiscard]] std::size_t entities() const noexcept { return places_.entities(); }
   /// Box of each entity's geometry in the axes of its body.
   [[nodiscard]] std::vector<scene::Aabb> entity_boxes_m() const;
+  /// Height of the highest point of static geometry, rel; minus infinity if nothing is static.
+  [[nodiscard]] float highest_static_m() const;
   /// Radius of each entity's geometry around the origin of its body, in m.
   [[nodiscard]] std::vector<float> entity_radii_m() const;
 

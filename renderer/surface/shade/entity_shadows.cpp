@@ -10,8 +10,11 @@
 
 namespace emit::renderer {
 
-EntityShadows::EntityShadows(std::span<const scene::Aabb> bounds_m)
-    : maps_(bounds_m), placements_(bounds_m.size()), shadows_(bounds_m.size()) {}
+EntityShadows::EntityShadows(std::span<const scene::Aabb> bounds_m, float highest_static_m)
+    : maps_(bounds_m),
+      highest_static_m_(highest_static_m),
+      placements_(bounds_m.size()),
+      shadows_(bounds_m.size()) {}
 
 void EntityShadows::begin(std::int64_t now_ns, const Environment& environment,
                           std::span<const PoseHistory> entities, const CasterRays& rays,
@@ -50,25 +53,25 @@ float EntityShadows::end_height_m(std::size_t entity, std::span<const glm::vec3,
   return end_m - kLowerDiagonals * diagonal_m;
 }
 
-void EntityShadows::add_rectangle(std::size_t entity, float end_m, Shadow& shadow) const noexcept {
+std::array<glm::vec3, 4> EntityShadows::rectangle_at(std::size_t entity,
+                                                     std::span<const glm::vec3, 8> corners_m,
+                                                     float at_m) const noexcept {
   // Bound the corners' shadows at that height, widened by the penumbra.
   glm::vec2 low_m(std::numeric_limits<float>::infinity());
   glm::vec2 high_m = -low_m;
   float farthest_m = 0.0F;
-  for (std::size_t i = 0; i < 8; ++i) {
-    const float way_m = std::max(0.0F, (shadow.hull_m[i].z - end_m) / to_sun_.z);
-    const glm::vec2 at_m = glm::vec2(shadow.hull_m[i]) - way_m * glm::vec2(to_sun_);
-    low_m = glm::min(low_m, at_m);
-    high_m = glm::max(high_m, at_m);
+  for (const glm::vec3& corner_m : corners_m) {
+    const float way_m = std::max(0.0F, (corner_m.z - at_m) / to_sun_.z);
+    const glm::vec2 place_m = glm::vec2(corner_m) - way_m * glm::vec2(to_sun_);
+    low_m = glm::min(low_m, place_m);
+    high_m = glm::max(high_m, place_m);
     farthest_m = std::max(farthest_m, way_m);
   }
   const float rim_m = maps_.rim_m(entity, farthest_m) / to_sun_.z;
   low_m -= rim_m;
   high_m += rim_m;
-  shadow.hull_m[8] = {low_m, end_m};
-  shadow.hull_m[9] = {high_m, end_m};
-  shadow.hull_m[10] = {low_m.x, high_m.y, end_m};
-  shadow.hull_m[11] = {high_m.x, low_m.y, end_m};
+  return {glm::vec3(low_m, at_m), glm::vec3(high_m, at_m), glm::vec3(low_m.x, high_m.y, at_m),
+          glm::vec3(high_m.x, low_m.y, at_m)};
 }
 
 void EntityShadows::place(std::int64_t drawn_ns, std::int64_t sun_ns,
@@ -85,8 +88,23 @@ void EntityShadows::place(std::int64_t drawn_ns, std::int64_t sun_ns,
     shadow.on = up && placements_[m].on && maps_.diagonal_m(m) > 0.0F;
     if (!shadow.on) continue;
     const std::array<glm::vec3, 8> corners_m = maps_.corners_m(m, placements_[m]);
-    std::ranges::copy(corners_m, shadow.hull_m.begin());
-    add_rectangle(m, end_height_m(m, corners_m, rays), shadow);
+    const float end_m = end_height_m(m, corners_m, rays);
+    std::ranges::copy(rectangle_at(m, corners_m, end_m), shadow.hull_m.begin() + 8);
+    // Begin at the highest surface that can take shade. The mesh that is drawn may lie higher than
+    // the surface as loaded, by a share of a pixel.
+    constexpr float kHigherDiagonals = 0.25F;
+    const float top_m = highest_static_m_ + kHigherDiagonals * maps_.diagonal_m(m);
+    const bool above = std::ranges::all_of(
+        corners_m, [top_m](const glm::vec3& corner_m) { return corner_m.z > top_m; });
+    if (!above) {
+      std::ranges::copy(corners_m, shadow.hull_m.begin());
+      continue;
+    }
+    shadow.on = end_m < top_m;
+    if (!shadow.on) continue;
+    const std::array<glm::vec3, 4> top = rectangle_at(m, corners_m, top_m);
+    std::ranges::copy(top, shadow.hull_m.begin());
+    std::ranges::copy(top, shadow.hull_m.begin() + 4);
   }
 }
 

@@ -24,15 +24,17 @@ class EntityShadows {
  public:
   /// Space that an entity may shade, down to static surfaces.
   struct Shadow {
-    bool on = false;  ///< the entity is there and the sun is up
+    /// The entity is there, the sun is up, and static geometry reaches as high as what is shaded.
+    bool on = false;
     /// Points whose convex hull holds everything that is shaded, rel.
     std::array<glm::vec3, 12> hull_m;
   };
 
   EntityShadows() = default;
   /// Takes memory for one map per entity. `bounds_m` holds the box of each entity in the axes of
-  /// its body.
-  explicit EntityShadows(std::span<const scene::Aabb> bounds_m);
+  /// its body. `highest_static_m` is the height of the highest static surface, rel: higher up
+  /// nothing takes shade.
+  EntityShadows(std::span<const scene::Aabb> bounds_m, float highest_static_m);
 
   /// Makes all depth maps for the poses and the sun of an instant. Setup. Frames make those anew
   /// whose entity has turned.
@@ -65,11 +67,13 @@ class EntityShadows {
   /// behind it, and a little lower. `corners_m` are those of its box.
   [[nodiscard]] float end_height_m(std::size_t entity, std::span<const glm::vec3, 8> corners_m,
                                    const CasterRays& rays) const noexcept;
-  /// Fills the last four points of a hull from the first eight: a level rectangle at `end_m` around
-  /// the shadow there, penumbra included.
-  void add_rectangle(std::size_t entity, float end_m, Shadow& shadow) const noexcept;
+  /// Returns the corners of a level rectangle at the height `at_m` around the shadow there, penumbra
+  /// included. `corners_m` are those of the entity's box, rel.
+  [[nodiscard]] std::array<glm::vec3, 4> rectangle_at(
+      std::size_t entity, std::span<const glm::vec3, 8> corners_m, float at_m) const noexcept;
 
   EntityShadowMaps maps_;
+  float highest_static_m_ = 0.0F;
   std::vector<EntityPlacement> placements_;  ///< by entity, of the latest place()
   std::vector<Shadow> shadows_;
   glm::vec3 to_sun_{0.0F, 0.0F, 1.0F};  ///< unit vector to the sun of shadows()

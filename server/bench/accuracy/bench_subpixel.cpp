@@ -50,7 +50,7 @@ constexpr double kFovRad = 2.0 * physics::kDegree;
 constexpr std::uint32_t kWidthPx = 128;
 constexpr std::uint32_t kHeightPx = 96;
 constexpr double kEyeUpM = 32'000.0;
-constexpr double kGroundHalfM = 2'000.0;
+constexpr double kGroundHalfM = 6'000.0;
 /// Size of the image in which the cost of a target is measured.
 constexpr std::uint32_t kCostWidthPx = 640;
 constexpr std::uint32_t kCostHeightPx = 512;
@@ -140,11 +140,12 @@ class BoxWorld {
  private:
   BoxWorld(bool windows, std::uint32_t width_px, std::uint32_t height_px)
       : scenario_(plain_scenario(width_px, height_px)),
-        pixel_rad_(2.0 * std::tan(0.5 * kFovRad) / width_px),
+        pixel_rad_(2.0 * std::tan(0.5 * kFovRad) / kWidthPx),
         eye_({0.0, 0.0, kEyeUpM},
              physics::world_from_body_heading_pitch_roll(0.0, -0.5 * physics::kPi, 0.0)) {
     scenario_.bands.resize(1);
-    scenario_.sensor.fov_h_rad = kFovRad;
+    // A pixel is as wide in every image, so that the box has the same size at the same range.
+    scenario_.sensor.fov_h_rad = 2.0 * std::atan(0.5 * width_px * pixel_rad_);
     if (!windows) scenario_.sensor.small_target_px = 0.0;
     scenario_.thermal.method = scene::ThermalMethod::cached;
     scene::Material& ground = scenario_.materials.front();
