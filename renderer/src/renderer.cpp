@@ -329,10 +329,13 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
   unknown_wet_ = !bare.empty();
   add_heat_warnings(scenario, geometry, bare, history_.environment.rains(), scene_stats_.warnings);
   if (!scenario.contacts.empty()) {
+    const scene::ThermalOptions& thermal = scenario.thermal;
+    const bool at_feet = thermal.method == scene::ThermalMethod::cached &&
+                         thermal.model == scene::ThermalModel::foster && thermal.lateral;
     scene_stats_.warnings.push_back(fmt::format(
-        "{}: [[contact]] is ignored: no body conducts to another here, only in emit solve in three "
-        "dimensions",
-        scenario.file.string()));
+        "{}: [[contact]] {}: bodies conduct to each other through all that they have in common "
+        "only in emit solve in three dimensions",
+        scenario.file.string(), at_feet ? "counts at the feet of walls alone" : "is ignored"));
   }
   // Give each entity a history of poses.
   for (std::size_t i = 0; i < scenario_.objects.size(); ++i) {

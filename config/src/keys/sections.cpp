@@ -66,9 +66,10 @@ const std::vector<SectionDoc>& scenario_sections() {
                   part_command_keys(), PartCommandDraft{}),
       section_doc("contact", true,
                   "A joint with a thermal resistance between bodies that touch. Bodies that touch "
-                  "without one conduct to each other as if grown together. Only `emit solve` in "
-                  "three dimensions conducts from body to body; all else ignores the section with "
-                  "a warning.",
+                  "without one conduct to each other as if grown together. The method `cached` "
+                  "with `foster` conducts from walls into the ground at their feet alone, and only "
+                  "`emit solve` in three dimensions through all contacts; all else ignores the "
+                  "section with a warning.",
                   contact_keys(), scene::ContactDesc{}),
       section_doc("clutter", true,
                   "Variation of a material from place to place "

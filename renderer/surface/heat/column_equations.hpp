@@ -21,6 +21,14 @@ struct ColumnEquations {
       below_w_m2_k{};  ///< to the next cell; that of the last one is not used
   physics::CellState<double> right_w_m2{};
   physics::CellState<double> alone_k{};  ///< cells at the end if there were no neighbours at all
+  /// Difference that neighbours make to the surface: surface_frac T_0 + aside_offset_k.
+  double surface_frac = 1.0;
+  double aside_offset_k = 0.0;
+
+  /// Returns the difference that neighbours make to the surface if the cells end like this.
+  [[nodiscard]] double aside_k(const physics::CellState<double>& cells_k) const noexcept {
+    return surface_frac * cells_k[0] + aside_offset_k;
+  }
 };
 
 /// Solves such a balance for the `count` temperatures; the rest are 0. RT-safe.
@@ -46,10 +54,11 @@ template <class Real>
 }
 
 /// Keeps the end of an interval in the state of a sample.
-inline void keep_cells(const physics::CellState<double>& alone_k,
-                       const physics::CellState<double>& cells_k, SampleState& state) noexcept {
+inline void keep_cells(const ColumnEquations& equations, const physics::CellState<double>& cells_k,
+                       SampleState& state) noexcept {
+  state.aside_k = static_cast<float>(equations.aside_k(cells_k));
   for (std::size_t l = 0; l < physics::kMaxColumnCells; ++l) {
-    state.alone_k[l] = static_cast<float>(alone_k[l]);
+    state.alone_k[l] = static_cast<float>(equations.alone_k[l]);
     state.cells_k[l] = static_cast<float>(cells_k[l]);
   }
 }

@@ -34,8 +34,7 @@ ColumnSystem::ColumnSystem(const SurfaceSamples& all) : all_(all) {
       }
     }
   }
-  // Walk from every column that has no island yet to all that heat connects with it. Conductances
-  // are per area of the own sample, so that their ratio gives the areas.
+  // Walk from every column that has no island yet to all that heat connects with it.
   for (std::uint32_t first = 0; first < count; ++first) {
     if (island_of_[first] != kNoIsland) continue;
     const auto island = static_cast<std::uint32_t>(island_end_.size());
@@ -50,17 +49,10 @@ ColumnSystem::ColumnSystem(const SurfaceSamples& all) : all_(all) {
         for (std::uint32_t k = column.first_link[l]; k < column.first_link[l + 1]; ++k) {
           const CellLink& link = all.links[k];
           if (island_of_[link.column] != kNoIsland) continue;
-          const SampleColumn& other = all.columns[link.column];
-          double back_w_m2_k = 0.0;
-          for (std::uint32_t b = other.first_link[link.cell]; b < other.first_link[link.cell + 1];
-               ++b) {
-            if (all.links[b].column == c && all.links[b].cell == l) {
-              back_w_m2_k = all.links[b].conductance_w_m2_k;
-            }
-          }
-          if (!(back_w_m2_k > 0.0) || !(link.conductance_w_m2_k > 0.0F)) continue;
+          if (!(link.conductance_w_m2_k > 0.0F)) continue;
           island_of_[link.column] = island;
-          area_m2_[link.column] = area_m2_[c] * link.conductance_w_m2_k / back_w_m2_k;
+          area_m2_[link.column] = static_cast<double>(all.columns[link.column].area_m2) /
+                                  static_cast<double>(all.columns[first].area_m2);
           members_.push_back(link.column);
         }
       }

@@ -65,11 +65,6 @@ SampleState FosterHeat::start_state(const SurfaceSample& sample, const glm::vec3
   for (const HeatInterval& interval : tail) {
     advance_unshadowed(sample.material, normal, interval, state.modes_k);
   }
-  // Reduce the states next to a solid: it kept the sun from the ground before the history too
-  // (physics.md eq. 23).
-  for (std::size_t i = 0; i < physics::kMaxFosterModes; ++i) {
-    state.modes_k[i] *= sample.open_before_frac[i];
-  }
   return state;
 }
 
@@ -178,7 +173,8 @@ SampleOutput FosterHeat::output_of(const SurfaceSample& sample, const Incoming& 
 
 double FosterHeat::offset_k(std::uint32_t material, const SampleState& state) const noexcept {
   if (materials_[material].prescribed()) return materials_[material].prescribed_k - reference_k_;
-  return physics::foster_offset_k(state.modes_k, surfaces_[material]) + state.aside_k();
+  return physics::foster_offset_k(state.modes_k, surfaces_[material]) +
+         static_cast<double>(state.aside_k);
 }
 
 SampleOutput FosterHeat::output(const SurfaceSample& sample, const glm::vec3& normal,
@@ -204,29 +200,21 @@ void FosterHeat::begin_column(const SurfaceSample& sample, SampleState& state) c
   // Take the slowest mode for the mean flux of the time before, whose profile is a line.
   const std::size_t slowest = network.count - 1;
   const double flux_w_m2 = state.modes_k[slowest] / network.modes[slowest].resistance_m2k_w;
+  const double base_k = surfaces_[sample.material].base_offset_k;
   double below_m2k_w = 0.0;
   for (std::size_t l = cells.count; l-- > 0;) {
-    const double offset_k = surfaces_[sample.material].base_offset_k +
-                            flux_w_m2 * (below_m2k_w + 0.5 * cells.resistance_m2k_w[l]);
-    state.cells_k[l] = state.alone_k[l] = static_cast<float>(offset_k);
+    const double rise_k = flux_w_m2 * (below_m2k_w + 0.5 * cells.resistance_m2k_w[l]);
+    state.cells_k[l] = static_cast<float>(base_k + sample.before_frac * rise_k);
+    state.alone_k[l] = static_cast<float>(sample.covered ? base_k : base_k + rise_k);
     below_m2k_w += cells.resistance_m2k_w[l];
   }
-}
-
-double FosterHeat::losses_w_m2_k(const SampleAdvance& each, const HeatInterval& interval,
-                                 const FosterDrive<double>& end) const noexcept {
-  const SurfaceSample& sample = *each.sample;
-  if (sample.covered) return 0.0;
-  const double t_k = reference_k_ + offset_k(sample.material, *each.state);
-  const double slope_w_m2_k = 4.0 * surfaces_[sample.material].emission_w_m2_k4 * t_k * t_k * t_k +
-                              end.film_w_m2_k + physics::latent_flux(t_k, end).slope_w_m2_k;
-  // The modes answer to a warmer surface too: they take up less.
-  const physics::FosterGains<double>& gains = interval.ladders[sample.material].level[0];
-  double answer_m2k_w = 0.0;
-  for (std::size_t i = 0; i < physics::kMaxFosterModes; ++i) {
-    answer_m2k_w += surfaces_[sample.material].resistance_m2k_w[i] * gains.end_frac[i];
+  // A surface that nothing reaches has no flux of its own: all of its heat comes from beside it.
+  if (sample.covered) {
+    state.modes_k = {};
+    state.aside_k = static_cast<float>(static_cast<double>(state.cells_k[0]) - base_k);
+  } else {
+    state.aside_k = static_cast<float>(-(1.0 - sample.before_frac) * flux_w_m2 * below_m2k_w);
   }
-  return slope_w_m2_k / (1.0 + slope_w_m2_k * answer_m2k_w);
 }
 
 ColumnEquations FosterHeat::column_equations(const SampleAdvance& each,
@@ -268,12 +256,30 @@ ColumnEquations FosterHeat::column_equations(const SampleAdvance& each,
     into_w_m2 = cells.heat_j_m2_k[0] * per_s * (out.alone_k[0] - each.state->alone_k[0]) +
                 cells.below_w_m2_k(0) * (out.alone_k[0] - next_k);
   }
-  // Give the same flux to the cells with neighbours. Where these make the surface warmer than was
-  // expected, it takes up less.
-  const double losses_w_m2_k = this->losses_w_m2_k(each, interval, end);
-  out.diagonal_w_m2_k[0] += losses_w_m2_k;
-  const double expected_k = each.state->aside_k() + each.drive.aside.change_k;
-  out.right_w_m2[0] += into_w_m2 + losses_w_m2_k * (out.alone_k[0] + expected_k);
+  // Give the cells with neighbours what their own surface takes up (physics.md eq. 80): the flux
+  // into the cells alone, and what the balance of the surface gains or loses at another temperature
+  // than the one at which the modes are driven.
+  const double alone_surface_k =
+      physics::foster_offset_k(each.state->modes_k, surfaces_[sample.material]);
+  const double change_k = static_cast<double>(each.state->aside_k) + each.drive.aside.change_k;
+  out.aside_offset_k = -alone_surface_k;
+  if (!sample.covered) {
+    const physics::FosterSurface<double>& surface = surfaces_[sample.material];
+    const double expected_k = alone_surface_k + change_k;
+    const double t_k = reference_k_ + expected_k;
+    const double slope_w_m2_k = 4.0 * surface.emission_w_m2_k4 * t_k * t_k * t_k + end.film_w_m2_k +
+                                physics::latent_flux(t_k, end).slope_w_m2_k;
+    const double at_zero_w_m2 =
+        into_w_m2 + physics::foster_flux_w_m2(expected_k, end, surface) -
+        physics::foster_flux_w_m2(alone_surface_k + sample.felt_frac * change_k, end, surface) +
+        slope_w_m2_k * expected_k;
+    const double above_m2k_w = sample.excess_frac / cells.surface_w_m2_k();
+    const double part = 1.0 / (1.0 + slope_w_m2_k * above_m2k_w);
+    out.surface_frac = part;
+    out.aside_offset_k += above_m2k_w * part * at_zero_w_m2;
+    out.diagonal_w_m2_k[0] += sample.exposed_frac * part * slope_w_m2_k;
+    out.right_w_m2[0] += sample.exposed_frac * part * at_zero_w_m2;
+  }
   for (std::size_t l = 0; l < cells.count; ++l) {
     const double held_w_m2_k = cells.heat_j_m2_k[l] * column.share_frac[l] * per_s;
     const double below = column.below_w_m2_k[l];
@@ -325,7 +331,7 @@ void FosterHeat::conduct_aside(const SampleAdvance& each, const HeatInterval& in
   }
   const physics::CellState<double> cells_k = solve_column(
       equations.count, equations.diagonal_w_m2_k, equations.below_w_m2_k, equations.right_w_m2);
-  keep_cells(equations.alone_k, cells_k, *each.state);
+  keep_cells(equations, cells_k, *each.state);
 }
 
 bool FosterHeat::begin_advance(const SampleAdvance& each, const HeatInterval& interval,
@@ -342,17 +348,14 @@ bool FosterHeat::begin_advance(const SampleAdvance& each, const HeatInterval& in
   const Incoming body_end = into_body(end, sample.covered, each.normal, forcing.end, each.back,
                                       &SampleDrive::longwave_end_w_m2);
   lane.ladder = &interval.ladders[sample.material];
-  // Reduce the resistances at the foot of a solid (physics.md eq. 23).
   FosterSurface<double>& surface = lane.surface;
   surface = surfaces_[sample.material];
   surface.base_offset_k += count_from_body(each, -1.0);
-  for (std::size_t i = 0; i < physics::kMaxFosterModes; ++i) {
-    surface.resistance_m2k_w[i] *= sample.open_frac[i];
-  }
   // Heat from neighbours shifts the temperature above which the own flux acts. Its mean over
   // the interval is added to the base.
   if (sample.column != kNoSample || sample.twin_of != kNoSample) {
-    surface.base_offset_k += each.state->aside_k() + 0.5 * drive.aside.change_k;
+    surface.base_offset_k +=
+        sample.felt_frac * (static_cast<double>(each.state->aside_k) + 0.5 * drive.aside.change_k);
   }
   // Let the modes decay without any flux if all faces are covered.
   if (sample.covered && (each.back == nullptr || each.back->sample.covered)) {
@@ -392,19 +395,23 @@ double FosterHeat::mean_flux_w_m2(const SurfaceSample& sample, const SampleState
   EMIT_CHECK_OP(dt_s, >, 0.0);
   const FosterMaterial& m = materials_[sample.material];
   if (m.prescribed()) return std::numeric_limits<double>::quiet_NaN();
-  // Take the slowest mode that the surface drives. At the foot of a solid the slow ones are cut.
-  constexpr float kOpen = 0.5F;
-  std::size_t i = m.network.count - 1;
-  while (i > 0 && sample.open_frac[i] < kOpen) --i;
-  if (sample.covered || !(sample.open_frac[i] > 0.0F)) return 0.0;
+  if (sample.covered) return 0.0;
+  // Neighbours change the flux. Read it off the drop between the surface and its first cell.
+  if (sample.column != kNoSample) {
+    const auto drop_k = [&](const SampleState& state) {
+      return offset_k(sample.material, state) - static_cast<double>(state.cells_k[0]);
+    };
+    return 0.5 * (drop_k(begin) + drop_k(end)) * cells_[sample.material].surface_w_m2_k() /
+           sample.excess_frac;
+  }
+  const std::size_t i = m.network.count - 1;
   // Solve eq. 17 for the constant flux that leads from one state to the other. States count from
   // the base of the material, modes from the base of the sample.
   const double own_base_k = surfaces_[sample.material].base_offset_k;
   const double begin_k = begin.modes_k[i] - m.base_shares[i] * (begin_base_offset_k - own_base_k);
   const double end_k = end.modes_k[i] - m.base_shares[i] * (end_base_offset_k - own_base_k);
   const double decay = -std::expm1(-dt_s / m.network.modes[i].tau_s);
-  return (end_k - begin_k + decay * begin_k) /
-         (sample.open_frac[i] * m.network.modes[i].resistance_m2k_w * decay);
+  return (end_k - begin_k + decay * begin_k) / (m.network.modes[i].resistance_m2k_w * decay);
 }
 
 double FosterHeat::count_from_body(const SampleAdvance& each, double sign) const noexcept {

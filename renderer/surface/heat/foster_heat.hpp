@@ -94,7 +94,8 @@ class FosterHeat {
     return cells_[material];
   }
   /// Fills the cells of a state at the start of the history from its modes: a steady profile with
-  /// the flux of the slowest one.
+  /// the flux of the slowest one, less what a solid beside or above has kept off. A covered sample
+  /// loses its modes.
   void begin_column(const SurfaceSample& sample, SampleState& state) const noexcept;
   /// Returns what the cells of a column meet beside them over an interval that all begin in
   /// `states`.
@@ -154,10 +155,6 @@ class FosterHeat {
   [[nodiscard]] bool begin_advance(const SampleAdvance& each, const HeatInterval& interval,
                                    const Incoming& end, const FilmSpan& film,
                                    physics::FosterLane& lane) const noexcept;
-  /// Returns by how much the flux into a surface falls per kelvin that neighbours add at the end of
-  /// an interval, W m-2 K-1.
-  [[nodiscard]] double losses_w_m2_k(const SampleAdvance& each, const HeatInterval& interval,
-                                     const physics::FosterDrive<double>& end) const noexcept;
   /// Returns the equations of a column over an interval. The state has its cells at the begin and
   /// its modes at the end.
   [[nodiscard]] ColumnEquations column_equations(

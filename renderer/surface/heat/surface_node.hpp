@@ -131,6 +131,7 @@ template <class T>
   out.modes_k = between(a.modes_k, b.modes_k, frac);
   out.cells_k = between(a.cells_k, b.cells_k, frac);
   out.alone_k = between(a.alone_k, b.alone_k, frac);
+  out.aside_k = between(a.aside_k, b.aside_k, frac);
   return out;
 }
 [[nodiscard]] inline SampleOutput between(const SampleOutput& a, const SampleOutput& b,

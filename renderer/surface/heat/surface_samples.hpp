@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <glm/ext/vector_float3.hpp>
+#include <limits>
 #include <vector>
 
 #include "emit/physics/column_cells.hpp"
@@ -22,10 +23,12 @@ struct SeenSample {
   float weight_frac = 0.0F;
 };
 
-/// Cells of the column of a sample beside a crease (physics.md eq. 22): which shares of them belong
-/// to it, and what they exchange heat with. All conductances are per area of the sample.
+/// Cells of the column of a sample near a crease or a foot (physics.md eq. 22): which shares of
+/// them belong to it, and what they exchange heat with. All conductances are per area of the
+/// sample.
 struct SampleColumn {
   std::uint32_t sample = kNoSample;
+  float area_m2 = 0.0F;
   physics::CellState<float> share_frac{};  ///< of the cells of the whole stack; the rest is cut off
   physics::CellState<float> below_w_m2_k{};  ///< to the next cell, or to the base
   /// Entries of SurfaceSamples::links of cell l: first_link[l] .. first_link[l + 1].
@@ -66,11 +69,22 @@ struct SurfaceSample {
   /// True if another face lies on the surface. No air and no radiation reach it then, and because
   /// contact between bodies is not modelled, it has no flux at all.
   bool covered = false;
-  /// Share o_i of the response of each mode that remains next to a solid, which keeps sun, sky and
-  /// air from the ground under it (physics.md eq. 23). The first holds over the history, the second
-  /// for the states at its start.
-  std::array<float, physics::kMaxFosterModes> open_frac{1.0F, 1.0F, 1.0F, 1.0F};
-  std::array<float, physics::kMaxFosterModes> open_before_frac{1.0F, 1.0F, 1.0F, 1.0F};
+  /// Distance along the surface to the nearest wall of a solid that stands on it, seen from beside
+  /// the solid or from under it; infinite: there is none within 3 m.
+  float foot_m = std::numeric_limits<float>::infinity();
+  /// Share of the heat of open ground that the cells have at the start of the history, because the
+  /// solid has kept sun, sky and air from the ground under it (physics.md eq. 23).
+  float before_frac = 1.0F;
+  /// Area that takes up the flux of the sample, per area of its column. Triangles that the foot of
+  /// a solid cuts give what lies open of them to their open corners. It is 0 under the solid.
+  float exposed_frac = 1.0F;
+  /// Share of the difference between surface and first cell of open ground that is left beside a
+  /// foot: half of it at the wall itself, where the flux ends.
+  float excess_frac = 1.0F;
+  /// Share of what neighbours add to the surface that counts where its modes are driven: 0 on
+  /// bodies that stand on ground and on that ground, because conduction there may take away more
+  /// than a surface that stood alone would ever lose.
+  float felt_frac = 1.0F;
   /// Sample of the other face of a sheet at the same place, which shares the state of this one.
   std::uint32_t other_side = kNoSample;
   float flat_m = 0.0F;   ///< the surface is plane at least this far in all directions
@@ -101,11 +115,8 @@ struct SampleState {
   /// heat of its neighbours, and as they were if it had none. They are 0 without a column.
   physics::CellState<float> cells_k{};
   physics::CellState<float> alone_k{};
-
-  /// Returns by how much the neighbours have warmed the surface.
-  [[nodiscard]] double aside_k() const noexcept {
-    return static_cast<double>(cells_k[0]) - static_cast<double>(alone_k[0]);
-  }
+  /// Difference that the neighbours have made to the surface temperature.
+  float aside_k = 0.0F;
 };
 
 /// Output of a sample at one node of time, which other samples and the device read.

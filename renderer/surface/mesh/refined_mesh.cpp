@@ -308,7 +308,8 @@ RefinedMesh::Place RefinedMesh::locate(std::uint32_t triangle,
       entry = nodes_[child + 1];
     }
   }
-  place.vertex = leaves_[entry >> 2U];
+  place.slot = entry >> 2U;
+  place.vertex = leaves_[place.slot];
   return place;
 }
 

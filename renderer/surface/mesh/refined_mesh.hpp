@@ -48,6 +48,7 @@ class RefinedMesh {
   struct Place {
     std::array<std::uint32_t, 3> vertex{};
     glm::vec3 weight{0.0F};
+    std::uint32_t slot = 0;  ///< leaf with these vertices
   };
 
   /// Complete state of a refined mesh, to be stored in a file; see from().

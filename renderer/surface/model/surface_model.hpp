@@ -4,9 +4,11 @@
 #include <functional>
 #include <glm/ext/vector_double3.hpp>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "emit/scene/mesh.hpp"
+#include "emit/scene/scene_desc.hpp"
 #include "history/band_lights.hpp"
 #include "surface/heat/sample_heat.hpp"
 #include "surface/heat/surface_samples.hpp"
@@ -69,6 +71,18 @@ struct SurfaceModel {
 /// Callback that receives the fraction done, 0 to 1. The builder stops if it returns false.
 using SurfaceProgress = std::function<bool(double done_frac)>;
 
+/// Joints of a scenario between bodies that touch, and the names of its objects. Plain data.
+struct BodyJoints {
+  std::vector<scene::ContactDesc> contacts;
+  std::vector<std::string> objects;  ///< names, by object
+
+  /// Returns the resistance of the joint between two bodies, each given by an object and a
+  /// material, in m2 K W-1; 0 where no contact names them.
+  [[nodiscard]] double resistance_m2k_w(std::uint32_t object, const scene::Material& material,
+                                        std::uint32_t other_object,
+                                        const scene::Material& other_material) const noexcept;
+};
+
 /// Inputs of build_surface_model(). All of them must outlive the call.
 struct SurfaceInputs {
   const scene::SceneGeometry& geometry;
@@ -76,6 +90,7 @@ struct SurfaceInputs {
   std::span<const std::int32_t> entity_of_object;  ///< entity of each object; -1: static
   const CasterRays& rays;                          ///< geometry that casts shade, as loaded
   const CasterRays& places;  ///< `geometry` with the same origin: finds the place that a ray hits
+  const BodyJoints& joints;
   const SampleHeat& heat;
   const SurfaceHistory& history;
   const HistoryRecord& record;

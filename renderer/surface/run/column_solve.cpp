@@ -164,9 +164,9 @@ void ColumnSolve::keep(std::uint32_t column, SurfaceNode& to) noexcept {
   if (stepped_again_[column] != 0) return;
   const std::uint32_t sample = all_.columns[column].sample;
   SampleState& state = to.states[sample];
-  const double before_k = state.aside_k();
-  keep_cells(system_.equations(column).alone_k, system_.cells_k(column), state);
-  change_k_s_[column] = static_cast<float>((state.aside_k() - before_k) / dt_s_);
+  const float before_k = state.aside_k;
+  keep_cells(system_.equations(column), system_.cells_k(column), state);
+  change_k_s_[column] = static_cast<float>(static_cast<double>(state.aside_k - before_k) / dt_s_);
   heat_.foster()->show_state(all_.samples[sample].material, state, to.outputs[sample]);
   if (sample < to.drawn) to.vertices[sample].offset_k = to.outputs[sample].offset_k;
 }

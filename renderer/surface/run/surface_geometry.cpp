@@ -13,11 +13,12 @@ namespace emit::renderer {
 
 SurfaceGeometry::SurfaceGeometry(scene::SceneGeometry geometry,
                                  std::vector<std::int32_t> entity_of_object, CasterRays places,
-                                 std::optional<SurfaceDetail> detail)
+                                 std::optional<SurfaceDetail> detail, BodyJoints joints)
     : geometry_(std::move(geometry)),
       entity_of_object_(std::move(entity_of_object)),
       places_(std::move(places)),
-      detail_(std::move(detail)) {}
+      detail_(std::move(detail)),
+      joints_(std::move(joints)) {}
 
 physics::Result<SurfaceGeometry> SurfaceGeometry::create(const scene::ScenarioDesc& scenario,
                                                          scene::SceneGeometry geometry,
@@ -37,8 +38,10 @@ physics::Result<SurfaceGeometry> SurfaceGeometry::create(const scene::ScenarioDe
     }
     ++entity;
   }
+  BodyJoints joints{scenario.contacts, {}};
+  for (const scene::ObjectDesc& object : scenario.objects) joints.objects.push_back(object.name);
   return SurfaceGeometry(std::move(geometry), std::move(entity_of_object), std::move(*places),
-                         std::move(detail));
+                         std::move(detail), std::move(joints));
 }
 
 std::vector<scene::Aabb> SurfaceGeometry::entity_boxes_m() const {

@@ -10,6 +10,7 @@
 #include "emit/physics/error.hpp"
 #include "emit/scene/mesh.hpp"
 #include "emit/scene/scene_desc.hpp"
+#include "surface/model/surface_model.hpp"
 #include "surface/rays/caster_rays.hpp"
 #include "surface/rays/surface_detail.hpp"
 
@@ -33,6 +34,7 @@ class SurfaceGeometry {
   [[nodiscard]] std::span<const std::int32_t> entity_of_object() const noexcept {
     return entity_of_object_;
   }
+  [[nodiscard]] const BodyJoints& joints() const noexcept { return joints_; }
   /// Number of entities.
   [[nodiscard]] std::size_t entities() const noexcept { return places_.entities(); }
   /// Box of each entity's geometry in the axes of its body.
@@ -59,12 +61,13 @@ class SurfaceGeometry {
 
  private:
   SurfaceGeometry(scene::SceneGeometry geometry, std::vector<std::int32_t> entity_of_object,
-                  CasterRays places, std::optional<SurfaceDetail> detail);
+                  CasterRays places, std::optional<SurfaceDetail> detail, BodyJoints joints);
 
   scene::SceneGeometry geometry_;
   std::vector<std::int32_t> entity_of_object_;
   CasterRays places_;
   std::optional<SurfaceDetail> detail_;
+  BodyJoints joints_;
 };
 
 }  // namespace emit::renderer

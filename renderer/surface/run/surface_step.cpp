@@ -197,7 +197,7 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
   double twin_change_k = 0.0;
   if (sample.twin_of != kNoSample) {
     // Neighbours warm a twin as much as the sample itself.
-    stepped.state.cells_k[0] = static_cast<float>(begin.states[sample.twin_of].aside_k());
+    stepped.state.aside_k = begin.states[sample.twin_of].aside_k;
     const std::uint32_t column = step.all.samples[sample.twin_of].column;
     if (column != kNoSample && step.columns != nullptr) {
       twin_change_k = step.columns->expected_change_k(column);

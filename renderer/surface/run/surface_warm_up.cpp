@@ -47,6 +47,7 @@ physics::Result<SurfaceModel> SurfaceWarmUp::build() const {
                              geometry.entity_of_object(),
                              geometry.rays(),
                              geometry.places(),
+                             geometry.joints(),
                              in_.heat,
                              in_.history,
                              record,

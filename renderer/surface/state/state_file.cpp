@@ -65,7 +65,8 @@ void visit_members(T& e, const Visit& visit) {
 template <class T, class Visit>
 requires std::same_as<std::remove_const_t<T>, SampleColumn>
 void visit_members(T& c, const Visit& visit) {
-  visit(c.sample), visit(c.share_frac), visit(c.below_w_m2_k), visit(c.first_link);
+  visit(c.sample), visit(c.area_m2), visit(c.share_frac), visit(c.below_w_m2_k),
+      visit(c.first_link);
 }
 template <class T, class Visit>
 requires std::same_as<std::remove_const_t<T>, CellLink>
@@ -85,14 +86,16 @@ void visit_members(T& s, const Visit& visit) {
   visit(s.rain_frac);
   visit(s.far_frac), visit(s.first_seen), visit(s.seen_count), visit(s.seen_scale);
   visit(s.covered);
-  visit(s.open_frac), visit(s.open_before_frac), visit(s.flat_m), visit(s.facet_m);
+  visit(s.foot_m), visit(s.before_frac), visit(s.exposed_frac), visit(s.excess_frac),
+      visit(s.felt_frac);
+  visit(s.flat_m), visit(s.facet_m);
   visit(s.column);
   visit(s.other_side), visit(s.vertex), visit(s.twin_of);
 }
 template <class T, class Visit>
 requires std::same_as<std::remove_const_t<T>, SampleState>
 void visit_members(T& s, const Visit& visit) {
-  visit(s.modes_k), visit(s.cells_k), visit(s.alone_k);
+  visit(s.modes_k), visit(s.cells_k), visit(s.alone_k), visit(s.aside_k);
 }
 template <class T, class Visit>
 requires std::same_as<std::remove_const_t<T>, SampleOutput>

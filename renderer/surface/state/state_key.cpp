@@ -136,11 +136,15 @@ std::uint64_t weather_hash(const scene::ScenarioDesc& scenario) {
   return hash.value();
 }
 
-/// Hash of the thermal options that the method `cached` reads.
-std::uint64_t thermal_hash(const scene::ThermalOptions& o) {
+/// Hash of the thermal options that the method `cached` reads, and of joints between bodies.
+std::uint64_t thermal_hash(const scene::ScenarioDesc& scenario) {
+  const scene::ThermalOptions& o = scenario.thermal;
   Fnv64 hash;
   add(hash, o.model, o.tolerance_k, o.initial_k, o.history_start_ns, o.spin_up_ns, o.foster_modes,
       o.steps, o.spacing, o.first_step_s, o.max_samples, o.lateral, o.exchange, o.film_factor);
+  for (const scene::ContactDesc& contact : scenario.contacts) {
+    add(hash, contact.between, contact.resistance_m2k_w);
+  }
   return hash.value();
 }
 
@@ -184,7 +188,7 @@ StateKey scenario_key(const scene::ScenarioDesc& scenario, const scene::SceneGeo
   at(key, StatePart::materials) = materials_hash(scenario, geometry);
   at(key, StatePart::place) = place_hash(scenario);
   at(key, StatePart::weather) = weather_hash(scenario);
-  at(key, StatePart::thermal) = thermal_hash(scenario.thermal);
+  at(key, StatePart::thermal) = thermal_hash(scenario);
   at(key, StatePart::camera) = camera_hash(scenario.sensor);
   return key;
 }

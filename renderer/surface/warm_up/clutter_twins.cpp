@@ -29,18 +29,16 @@ void start_twins(const SurfaceInputs& inputs, const SurfaceSamples& all,
       const auto make = [&] {
         return inputs.heat.start_state(twin, normal, inputs.history, inputs.record.tail);
       };
-      const bool whole =
-          std::ranges::all_of(twin.open_before_frac, [](float frac) { return frac == 1.0F; });
-      if (!whole) {
-        histories.start[s] = make();
-        continue;
-      }
       if (material != twin.material || facing != normal) {
         material = twin.material;
         facing = normal;
         known = make();
       }
       histories.start[s] = known;
+      // Under a solid it has no heat of its own; see FosterHeat::begin_column().
+      if (twin.covered && all.samples[twin.twin_of].column != kNoSample) {
+        histories.start[s].modes_k = {};
+      }
     }
   });
 }

@@ -6,6 +6,7 @@
 
 #include "emit/physics/check.hpp"
 #include "surface/rays/ray_offsets.hpp"
+#include "surface/warm_up/surface_columns.hpp"
 
 namespace emit::renderer {
 
@@ -13,6 +14,7 @@ SunTracer::SunTracer(const SurfaceInputs& inputs, const SurfaceModelOptions& opt
     : in_(inputs), lateral_(options.lateral), max_blur_m_(static_cast<float>(options.max_blur_m)) {
   for (const scene::Material& material : inputs.materials) {
     diffusivity_m2_s_.push_back(static_cast<float>(diffusivity_m2_s(material)));
+    foot_reach_m_.push_back(foot_reach_m(material));
   }
 }
 
@@ -23,8 +25,9 @@ void SunTracer::trace(const SurfaceSample& sample, std::span<float> sun_frac,
   EMIT_DCHECK(hidden_sky.empty() || hidden_sky.size() == record.size());
   const RayOffsets offsets = ray_offsets(sample.position_m, sample.facet_m);
   // Limit the blur to half of the way over which the surface is a plane: rays must not start beyond
-  // an edge.
-  const float max_blur_m = lateral_ ? std::min(max_blur_m_, 0.5F * sample.flat_m) : 0.0F;
+  // an edge. Near the foot of a solid the cells of columns conduct instead.
+  const bool blurs = lateral_ && !(sample.foot_m < foot_reach_m_[sample.material]);
+  const float max_blur_m = blurs ? std::min(max_blur_m_, 0.5F * sample.flat_m) : 0.0F;
   for (std::size_t i = 0; i < record.size(); ++i) {
     // Spread the starts of the rays as far as lateral conduction has blurred the edge of a shadow
     // since then (physics.md eq. 21).

@@ -24,6 +24,7 @@ class SunTracer {
   const SurfaceInputs& in_;
   bool lateral_ = true;
   float max_blur_m_ = 0.0F;
+  std::vector<float> foot_reach_m_;      ///< foot_reach_m() by material
   std::vector<float> diffusivity_m2_s_;  ///< diffusivity of the first layer, by material
 };
 

@@ -338,7 +338,7 @@ void Builder::replace_covered() {
     for (std::uint32_t slot = 0; slot < mesh.leaf_count(); ++slot) {
       for (const std::uint32_t covered : mesh.leaf(slot)) {
         const SurfaceSample& under = all.samples[first + covered];
-        if (!under.covered || under.other_side != kNoSample || under.column != kNoSample) continue;
+        if (!under.covered || under.other_side != kNoSample) continue;
         for (const std::uint32_t other : mesh.leaf(slot)) {
           if (all.samples[first + other].covered) continue;
           std::uint32_t& nearest = open[covered];
@@ -348,14 +348,24 @@ void Builder::replace_covered() {
         }
       }
     }
-    // Copy the open ones, and their twins, to the places of the covered ones.
+    // Copy the open ones, and their twins, to the places of the covered ones. Those with a column
+    // keep their heat, which is that of ground under a solid, and take the view alone.
     const auto copy = [&](std::uint32_t to, std::uint32_t from) {
-      const std::uint32_t vertex = all.samples[to].vertex;
-      const std::uint32_t twin_of = all.samples[to].twin_of;
-      all.samples[to] = all.samples[from];
-      all.samples[to].vertex = vertex;
-      all.samples[to].twin_of = twin_of;
-      all.samples[to].column = kNoSample;
+      const SurfaceSample own = all.samples[to];
+      SurfaceSample& sample = all.samples[to];
+      sample = all.samples[from];
+      sample.vertex = own.vertex;
+      sample.twin_of = own.twin_of;
+      sample.column = own.column;
+      const bool keeps_heat = own.twin_of == kNoSample
+                                  ? own.column != kNoSample
+                                  : all.samples[own.twin_of].column != kNoSample;
+      sample.covered = keeps_heat;
+      if (keeps_heat) {
+        sample.exposed_frac = own.exposed_frac;
+        sample.excess_frac = own.excess_frac;
+        return;
+      }
       model_.states[to] = model_.states[from];
       model_.outputs[to] = model_.outputs[from];
     };

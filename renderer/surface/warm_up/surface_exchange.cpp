@@ -593,7 +593,7 @@ void Sweeper::march(const Window& window) {
               front.known_k[k][l] = static_cast<float>(columns_.cells_k(c)[l]);
             }
             const double change_k =
-                columns_.cells_k(c)[0] - columns_.equations(c).alone_k[0] - front.next.aside_k();
+                columns_.equations(c).aside_k(columns_.cells_k(c)) - front.next.aside_k;
             off_k[i] = std::max(off_k[i], std::abs(change_k - front.change_k));
             front.change_k = change_k;
             front.known_change_k[k] = static_cast<float>(change_k);
@@ -638,8 +638,8 @@ void Sweeper::carry_columns(std::size_t group, const Window& window) {
     for (std::size_t i = 0; i < chosen.count; ++i) {
       const std::uint32_t s = swept_[chosen.first + i];
       SampleAdvance& advance = advances[i];
-      // Only what neighbours add to the surface is known here: cells alone stand for nothing.
-      states[i].cells_k[0] += fronts_[column(s)].known_change_k[k];
+      // Only what neighbours add to the surface is known here: cells stay as they are.
+      states[i].aside_k += fronts_[column(s)].known_change_k[k];
       advance.drive.longwave_begin_w_m2 = advance.drive.longwave_end_w_m2;
       const SampleOutput output = in_.heat.output(*advance.sample, advance.normal,
                                                   interval.forcing.end, advance.drive, states[i]);
@@ -684,8 +684,7 @@ void Sweeper::end_columns(std::size_t group, const Window& window, std::size_t k
     const SurfaceSample& sample = model_.samples.samples[s];
     Front& front = fronts_[sample.column];
     if (j == 0 && chosen.body >= 0) bodies_->add(group, 0, s, model_.states[s]);
-    keep_cells(columns_.equations(sample.column).alone_k, columns_.cells_k(sample.column),
-               front.next);
+    keep_cells(columns_.equations(sample.column), columns_.cells_k(sample.column), front.next);
     model_.states[s] = front.next;
     // Take what arrives at the end of the interval.
     front.drive.longwave_begin_w_m2 = front.drive.longwave_end_w_m2;
@@ -785,7 +784,7 @@ double Sweeper::aside_of_k(const SurfaceSample& twin, std::size_t k) const noexc
   const std::uint32_t column = model_.samples.samples[twin.twin_of].column;
   if (column == kNoSample) return 0.0;
   const std::array<float, kWindow>& change_k = fronts_[column].known_change_k;
-  double sum_k = begin_[twin.twin_of].aside_k();
+  double sum_k = begin_[twin.twin_of].aside_k;
   for (std::size_t j = 0; j < k; ++j) sum_k += static_cast<double>(change_k[j]);
   return sum_k;
 }
@@ -815,7 +814,7 @@ void Sweeper::carry_twins(std::size_t group, const Window& window) {
       front.drive = drive(s, front.normal, window, k);
       // Neighbours warm a twin as much as the sample itself.
       const double aside_k = aside_of_k(*front.sample, k);
-      states[i].cells_k[0] = static_cast<float>(aside_k);
+      states[i].aside_k = static_cast<float>(aside_k);
       front.drive.aside.change_k = aside_of_k(*front.sample, k + 1) - aside_k;
       if (front.back != nullptr) {
         back_drives[i] = drive(front.sample->other_side, -front.normal, window, k);
@@ -827,7 +826,7 @@ void Sweeper::carry_twins(std::size_t group, const Window& window) {
   const SurfaceForcing& end = in_.record.intervals[last].forcing.end;
   for (std::size_t i = 0; i < chosen.count; ++i) {
     const std::uint32_t s = swept_[chosen.first + i];
-    states[i].cells_k[0] = static_cast<float>(aside_of_k(all[s], window.count));
+    states[i].aside_k = static_cast<float>(aside_of_k(all[s], window.count));
     model_.states[s] = states[i];
     model_.outputs[s] = in_.heat.output(all[s], fronts[i].normal, end, fronts[i].drive, states[i]);
     const std::uint32_t other = all[s].other_side;

@@ -26,11 +26,15 @@ constexpr std::size_t kTangents = CasterRays::kMaxRays;
 constexpr float kMaxWorldM = 20'000.0F;
 /// Cosine between the normals of two faces below which one stands upright on the other.
 constexpr float kWallCos = 0.3F;
-/// Greatest distance of a wall that counts as a foot on the surface, in m.
+/// Greatest distance of a wall that counts as a foot on the surface, in m (SurfaceSample::foot_m).
 constexpr float kMaxFootM = 3.0F;
 /// Distance in ray offsets behind a wall at which the surface is sought under it, and its greatest
 /// depth there.
 constexpr float kUnderOffsets = 8.0F;
+/// Distance in ray offsets from a wall within which a covered sample lies on its foot, and that
+/// beside the wall to which it goes.
+constexpr float kOnFootOffsets = 4.0F;
+constexpr float kBesideFootOffsets = 2.0F;
 /// Allowed error of a share of the sky: in tolerances of temperature, and at least the share that
 /// rays do not resolve.
 constexpr float kAlikeFrac = 0.25F;
@@ -45,6 +49,13 @@ constexpr float kFeelM = 20.0F;
 /// a sample is to take the mean of their views.
 constexpr float kFreeLengths = 2.0F;
 
+/// Returns the direction of a ray along the surface whose tangents are `u` and `v`.
+glm::vec3 tangent(std::size_t ray, const glm::vec3& u, const glm::vec3& v) {
+  const auto angle =
+      static_cast<float>(2.0 * physics::kPi * (static_cast<double>(ray) + 0.5) / kTangents);
+  return std::cos(angle) * u + std::sin(angle) * v;
+}
+
 }  // namespace
 
 PatchSampler::PatchSampler(const SurfaceInputs& inputs, const DriveSensitivity& sensitivity,
@@ -57,7 +68,6 @@ PatchSampler::PatchSampler(const SurfaceInputs& inputs, const DriveSensitivity& 
       sky_(inputs.heat.sky_measure() == SkyMeasure::cosine ? kSampleSkyRays : kSampleViewRays),
       sphere_(kSampleViewRays),
       tracer_(inputs, options) {
-  history_s_ = inputs.record.lag_s.empty() ? 0.0 : static_cast<double>(inputs.record.lag_s[0]);
   // Spread the rays evenly over the disc that the cone cuts out of a level plane.
   for (std::size_t k = 0; k < rain_from_.size(); ++k) {
     constexpr float kGoldenAngleRad = 2.3999632F;
@@ -67,8 +77,13 @@ PatchSampler::PatchSampler(const SurfaceInputs& inputs, const DriveSensitivity& 
     rain_from_[k] = glm::normalize(
         glm::vec3(tangent * std::cos(azimuth_rad), tangent * std::sin(azimuth_rad), 1.0F));
   }
-  for (const scene::Material& material : inputs.materials) {
-    diffusivity_m2_s_.push_back(static_cast<float>(diffusivity_m2_s(material)));
+  // Find how far heat spreads in the memory of the slowest mode of each material.
+  for (std::uint32_t m = 0; m < inputs.materials.size(); ++m) {
+    const physics::FosterNetwork* network =
+        options.lateral && inputs.heat.foster() != nullptr ? &inputs.history.network(m) : nullptr;
+    const double slowest_s =
+        network != nullptr && network->count != 0 ? network->modes[network->count - 1].tau_s : 0.0;
+    memory_m_.push_back(std::sqrt(diffusivity_m2_s(inputs.materials[m]) * slowest_s));
   }
   // Find by material the difference of shares of the sky that is a quarter of the tolerance.
   for (std::uint32_t m = 0; m < inputs.materials.size(); ++m) {
@@ -83,11 +98,6 @@ SampleState PatchSampler::start_state(const SurfaceSample& sample, StartMemo& me
   const auto make = [&] {
     return in_.heat.start_state(sample, normal, in_.history, in_.record.tail);
   };
-  // Use the memo only for samples without a wall beside them: others start with states of their
-  // own.
-  const bool whole =
-      std::ranges::all_of(sample.open_before_frac, [](float frac) { return frac == 1.0F; });
-  if (!whole) return make();
   if (memo.material != sample.material || memo.normal != normal) {
     memo = {sample.material, normal, make()};
   }
@@ -124,10 +134,8 @@ bool PatchSampler::inherit_view(SurfacePatch& patch, std::uint32_t index,
   sample.rain_frac = low.rain_frac;
   sample.hull_open_frac = mean(low.hull_open_frac, high.hull_open_frac);
   sample.hull_tilt_frac = 0.5F * (low.hull_tilt_frac + high.hull_tilt_frac);
-  for (std::size_t i = 0; i < sample.open_frac.size(); ++i) {
-    sample.open_frac[i] = mean(low.open_frac[i], high.open_frac[i]);
-    sample.open_before_frac[i] = mean(low.open_before_frac[i], high.open_before_frac[i]);
-  }
+  sample.foot_m = mean(low.foot_m, high.foot_m);
+  sample.before_frac = mean(low.before_frac, high.before_frac);
   // Take the greater free distance of the parents, less the way from there.
   sample.flat_m = std::max(low.flat_m, high.flat_m) - 0.5F * edge_m;
   patch.to_sky[index] = to_sky;
@@ -212,6 +220,46 @@ void PatchSampler::look_around(SurfacePatch& patch, std::uint32_t index,
   feel_along(patch, index, point, selection);
 }
 
+void PatchSampler::leave_foot(SurfacePatch& patch, std::uint32_t index,
+                              const SampleStand& stand) const {
+  SurfaceSample& sample = patch.samples[index];
+  const float offset_m = ray_offsets(sample.position_m, sample.facet_m).around_m;
+  if (!sample.covered || sample.entity >= 0 || sample.foot_m > kOnFootOffsets * offset_m) return;
+  // Go across the wall in the direction in which it is nearest.
+  const auto [u, v] = tangents_of(sample.normal);
+  std::array<CasterRay, kTangents> rays;
+  std::array<CasterHit, kTangents> hits;
+  for (std::size_t k = 0; k < kTangents; ++k) {
+    rays[k] = {sample.position_m + offset_m * stand.inward + 2.0F * offset_m * sample.normal,
+               tangent(k, u, v)};
+  }
+  const std::uint32_t met = in_.rays.first_hits(rays, {true, {}}, hits, kFeelM);
+  std::size_t nearest = kTangents;
+  for (std::size_t k = 0; k < kTangents; ++k) {
+    if (((met >> k) & 1U) == 0U || hits[k].front ||
+        std::abs(glm::dot(hits[k].normal, sample.normal)) > kWallCos) {
+      continue;
+    }
+    if (nearest == kTangents || hits[k].distance_m < hits[nearest].distance_m) nearest = k;
+  }
+  if (nearest == kTangents) return;
+  const glm::vec3& out = hits[nearest].normal;
+  const float away_m = hits[nearest].distance_m * glm::dot(rays[nearest].direction, out);
+  const glm::vec3 beside_m = (away_m + kBesideFootOffsets * offset_m) * out;
+  SurfaceSample moved = sample;
+  moved.covered = false;
+  moved.foot_m = std::numeric_limits<float>::infinity();
+  moved.position_m += beside_m;
+  std::swap(sample, moved);
+  SampleStand there = stand;
+  there.drawn_m += beside_m;
+  look_around(patch, index, there);
+  if (!sample.covered) return;
+  // Another body stands beside this one.
+  sample = moved;
+  look_around(patch, index, stand);
+}
+
 float PatchSampler::rain_share(const ViewPoint& point,
                                const CasterSelection& selection) const noexcept {
   // Nobody knows what would keep rain off an underside if its entity turned over.
@@ -256,9 +304,7 @@ void PatchSampler::feel_along(SurfacePatch& patch, std::uint32_t index, const Vi
   std::array<CasterHit, kTangents> above;
   std::array<CasterHit, kTangents> below;
   for (std::size_t k = 0; k < kTangents; ++k) {
-    const auto angle =
-        static_cast<float>(2.0 * physics::kPi * (static_cast<double>(k) + 0.5) / kTangents);
-    rays[k] = {base_m + 2.0F * offset_m * n, std::cos(angle) * u + std::sin(angle) * v};
+    rays[k] = {base_m + 2.0F * offset_m * n, tangent(k, u, v)};
   }
   const std::uint32_t met_above = in_.rays.first_hits(rays, selection, above, kFeelM);
   for (CasterRay& ray : rays) ray.origin_m -= 4.0F * offset_m * n;
@@ -272,12 +318,22 @@ void PatchSampler::feel_along(SurfacePatch& patch, std::uint32_t index, const Vi
   if (!options_.lateral) return;
 
   // Find the walls that stand on the surface: if it continues under them, nothing reaches it there.
-  std::array<float, kTangents> wall_m;
-  wall_m.fill(-1.0F);
-  bool any = false;
+  // A covered sample lies under a solid and looks at its walls from behind.
+  const double memory_m = memory_m_[sample.material];
+  double beyond_frac = 0.0;
   for (std::size_t k = 0; k < kTangents; ++k) {
-    if (((met_above >> k) & 1U) == 0U || above[k].distance_m > kMaxFootM || !above[k].front ||
-        std::abs(glm::dot(above[k].normal, n)) > kWallCos) {
+    if (((met_above >> k) & 1U) == 0U || above[k].distance_m > kMaxFootM ||
+        above[k].front == sample.covered || std::abs(glm::dot(above[k].normal, n)) > kWallCos) {
+      continue;
+    }
+    const auto count = [&] {
+      sample.foot_m = std::min(sample.foot_m, above[k].distance_m);
+      beyond_frac +=
+          std::exp(-static_cast<double>(above[k].distance_m) / std::max(memory_m, 1e-6)) /
+          kTangents;
+    };
+    if (sample.covered) {
+      count();
       continue;
     }
     const CasterRay down{rays[k].origin_m + 4.0F * offset_m * n +
@@ -286,27 +342,11 @@ void PatchSampler::feel_along(SurfacePatch& patch, std::uint32_t index, const Vi
     std::array<CasterHit, 1> under;
     if (in_.rays.first_hits({&down, 1}, selection, under) != 0U &&
         under[0].distance_m < kUnderOffsets * offset_m) {
-      wall_m[k] = above[k].distance_m;
-      any = true;
+      count();
     }
   }
-  if (!any) return;
-  // Reduce the response of each mode by the walls' shares, for its memory (physics.md eq. 23).
-  const physics::FosterNetwork& network = in_.history.network(sample.material);
-  const auto open = [&](double memory_s) {
-    const double depth_m =
-        std::sqrt(static_cast<double>(diffusivity_m2_s_[sample.material]) * memory_s);
-    double covered = 0.0;
-    for (const float distance_m : wall_m) {
-      if (distance_m < 0.0F) continue;
-      covered += std::exp(-static_cast<double>(distance_m) / std::max(depth_m, 1e-6)) / kTangents;
-    }
-    return static_cast<float>(1.0 - covered);
-  };
-  for (std::size_t i = 0; i < network.count; ++i) {
-    sample.open_frac[i] = open(std::min(network.modes[i].tau_s, history_s_));
-    sample.open_before_frac[i] = open(network.modes[i].tau_s);
-  }
+  // Heat of the time before the history has come from beside the solid alone (physics.md eq. 23).
+  sample.before_frac = static_cast<float>(sample.covered ? beyond_frac : 1.0 - beyond_frac);
 }
 
 bool PatchSampler::of_a_sheet(const SeenFace& face) const noexcept {
@@ -463,7 +503,10 @@ void PatchSampler::evaluate(std::span<const NewSample> samples, StartMemo& memo)
     // Find the view and the shade of each face.
     const std::uint32_t index = each.index;
     const auto look = [&](SurfacePatch& side) {
-      if (!inherit_view(side, index, each.stand)) look_around(side, index, each.stand);
+      if (!inherit_view(side, index, each.stand)) {
+        look_around(side, index, each.stand);
+        leave_foot(side, index, each.stand);
+      }
       tracer_.trace(side.samples[index], side.sun_frac.row(index), side.hidden_sky.row(index));
     };
     SurfacePatch& patch = *each.patch;

@@ -154,6 +154,10 @@ class PatchSampler {
 
   /// Finds the shares of sky and surroundings of a sample by rays, and whether it is covered.
   void look_around(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand) const;
+  /// Looks around from a sample that lies on the foot of a wall, from beside the wall: its view
+  /// from the line itself would be that of the ground under the wall or of the open one, by
+  /// rounding.
+  void leave_foot(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand) const;
 
   /// Returns the share of the rain around the vertical that nothing above a point keeps off.
   [[nodiscard]] float rain_share(const ViewPoint& point,
@@ -164,7 +168,7 @@ class PatchSampler {
                      const CasterSelection& selection) const;
 
   /// Sends rays along the surface, a little above and a little below it. They show how far it is a
-  /// plane and which walls stand on it (physics.md eq. 23).
+  /// plane and which walls stand on it.
   void feel_along(SurfacePatch& patch, std::uint32_t index, const ViewPoint& point,
                   const CasterSelection& selection) const;
 
@@ -175,10 +179,11 @@ class PatchSampler {
   ViewSampler sky_;
   SphereSampler sphere_;
   SunTracer tracer_;
-  double history_s_ = 0.0;
   std::array<glm::vec3, CasterRays::kMaxRays> rain_from_{};  ///< directions, of even weight
-  std::vector<float> diffusivity_m2_s_;  ///< diffusivity of the first layer, by material
-  std::vector<float> sky_limit_frac_;    ///< by material: difference up to which shares are alike
+  /// Distance that heat spreads over in the memory of the slowest mode, by material; 0 where no
+  /// heat moves along the surface.
+  std::vector<double> memory_m_;
+  std::vector<float> sky_limit_frac_;  ///< by material: difference up to which shares are alike
 };
 
 }  // namespace emit::renderer

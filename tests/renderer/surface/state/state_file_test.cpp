@@ -73,8 +73,11 @@ struct World {
       sample.seen_count = 1;
       sample.seen_scale = number();
       sample.covered = i % 2 == 0;
-      sample.open_frac[2] = number();
-      sample.open_before_frac[3] = number();
+      sample.foot_m = number();
+      sample.before_frac = number();
+      sample.exposed_frac = number();
+      sample.excess_frac = number();
+      sample.felt_frac = number();
       sample.flat_m = number();
       sample.vertex = i;
       if (i >= model.drawn_samples) {
@@ -86,6 +89,7 @@ struct World {
         sample.column = i;
         SampleColumn column;
         column.sample = i;
+        column.area_m2 = number();
         column.share_frac[2] = number();
         column.below_w_m2_k[3] = number();
         column.first_link.fill(i);
@@ -99,6 +103,7 @@ struct World {
       state.modes_k[1] = number();
       state.cells_k[1] = number();
       state.alone_k[7] = number();
+      state.aside_k = number();
       model.states.push_back(state);
       model.outputs.push_back({number(), number(), number(), number()});
     }
@@ -190,8 +195,11 @@ TEST_F(StateFile, gives_back_what_was_written_and_leaves_nothing_beside_it) {
     EXPECT_EQ(a.normal, b.normal);
     EXPECT_EQ(a.entity, b.entity);
     EXPECT_EQ(a.covered, b.covered);
-    EXPECT_EQ(a.open_frac, b.open_frac);
-    EXPECT_EQ(a.open_before_frac, b.open_before_frac);
+    EXPECT_EQ(a.foot_m, b.foot_m);
+    EXPECT_EQ(a.before_frac, b.before_frac);
+    EXPECT_EQ(a.exposed_frac, b.exposed_frac);
+    EXPECT_EQ(a.excess_frac, b.excess_frac);
+    EXPECT_EQ(a.felt_frac, b.felt_frac);
     EXPECT_EQ(a.material, b.material);
     EXPECT_EQ(a.sky_frac, b.sky_frac);
     EXPECT_EQ(a.sphere_sky_frac, b.sphere_sky_frac);
@@ -209,6 +217,7 @@ TEST_F(StateFile, gives_back_what_was_written_and_leaves_nothing_beside_it) {
     EXPECT_EQ(got->states[i].modes_k, model.states[i].modes_k);
     EXPECT_EQ(got->states[i].cells_k, model.states[i].cells_k);
     EXPECT_EQ(got->states[i].alone_k, model.states[i].alone_k);
+    EXPECT_EQ(got->states[i].aside_k, model.states[i].aside_k);
     EXPECT_EQ(got->outputs[i].offset_k, model.outputs[i].offset_k);
     EXPECT_EQ(got->outputs[i].sun_frac, model.outputs[i].sun_frac);
     EXPECT_EQ(got->outputs[i].longwave_out_w_m2, model.outputs[i].longwave_out_w_m2);
@@ -220,6 +229,7 @@ TEST_F(StateFile, gives_back_what_was_written_and_leaves_nothing_beside_it) {
   ASSERT_EQ(got->samples.links.size(), kColumns);
   for (std::size_t i = 0; i < kColumns; ++i) {
     EXPECT_EQ(got->samples.columns[i].sample, model.samples.columns[i].sample);
+    EXPECT_EQ(got->samples.columns[i].area_m2, model.samples.columns[i].area_m2);
     EXPECT_EQ(got->samples.columns[i].share_frac, model.samples.columns[i].share_frac);
     EXPECT_EQ(got->samples.columns[i].below_w_m2_k, model.samples.columns[i].below_w_m2_k);
     EXPECT_EQ(got->samples.columns[i].first_link, model.samples.columns[i].first_link);

@@ -115,13 +115,30 @@ class Body {
   /// Replaces the weather and the radiation of the body: there is none.
   void hang_in_air(std::vector<scene::WeatherSample> weather, double base_k) {
     scenario_.weather = std::move(weather);
-    for (scene::Material* material :
-         {scenario_.materials.data(), scene_.geometry.materials.data()}) {
-      material->emissivity_frac = 1e-9;
-      material->solar_absorptance_frac = 0.0;
-      material->base_k = base_k;
-      material->initial_k = base_k;
+    for (scene::Material& material : scenario_.materials) {
+      material.emissivity_frac = 1e-9;
+      material.solar_absorptance_frac = 0.0;
+      material.base_k = base_k;
+      material.initial_k = base_k;
     }
+    scene_.geometry.materials = scenario_.materials;
+  }
+  /// Puts the body on ground of its own stack, 8 m wide. Call it before hang_in_air().
+  void put_on_ground(std::vector<scene::Layer> layers) {
+    scene::Material ground = scenario_.materials[0];
+    ground.name = "ground";
+    ground.layers = std::move(layers);
+    scenario_.materials.push_back(ground);
+    scene::Mesh plane = test::level_mesh(glm::vec3(-4.0F), glm::vec3(4.0F), 0.0F);
+    plane.submeshes[0].material = 1;
+    scene_.add_static(std::move(plane), glm::dvec3(0.0, 0.0, 50.0));
+    scene_.geometry.materials = scenario_.materials;
+    scenario_.objects.resize(2);
+    scenario_.objects[0].name = "body";
+    scenario_.objects[1].name = "plane";
+  }
+  void join(double resistance_m2k_w) {
+    scenario_.contacts = {{{"ground", "body"}, resistance_m2k_w}};
   }
   void step(std::uint32_t steps) { scenario_.thermal.steps = steps; }
   void look_closely(double pixel_rad) { pixel_rad_ = pixel_rad; }
@@ -130,9 +147,9 @@ class Body {
     environment_.emplace(scenario_);
     auto networks = build_foster_materials(scenario_, scene_.geometry.materials);
     ASSERT_TRUE(networks.has_value()) << networks.error().text;
-    auto surface =
-        CachedSurface::create(scenario_, scene_.geometry, {-1},
-                              std::span(*networks).first(networks->size() - 1), kReferenceK);
+    auto surface = CachedSurface::create(
+        scenario_, scene_.geometry, std::vector<std::int32_t>(scenario_.objects.size(), -1),
+        std::span(*networks).first(networks->size() - 1), kReferenceK);
     ASSERT_TRUE(surface.has_value()) << surface.error().text;
     surface_ = std::move(*surface);
     history_.emplace(scenario_.thermal.steps,
@@ -144,7 +161,9 @@ class Body {
   }
   void advance(std::int64_t now_ns) { surface_->advance(now_ns, {*environment_, {}}, *history_); }
   [[nodiscard]] const SurfaceModel& model() const { return surface_->model(); }
-  [[nodiscard]] const scene::Instance& instance() const { return scene_.geometry.instances[0]; }
+  [[nodiscard]] const scene::Instance& instance(std::size_t index = 0) const {
+    return scene_.geometry.instances[index];
+  }
   [[nodiscard]] const std::vector<scene::Layer>& layers() const {
     return scenario_.materials[0].layers;
   }
@@ -198,9 +217,12 @@ TEST(SurfaceColumns, ShareTheMaterialBelowTheSurfaceWithoutGapOrOverlap) {
       const std::uint32_t column = model.samples.samples[s].column;
       for (std::size_t l = 0; l < cells.count; ++l) {
         // A sample in the middle of a face has the whole stack for itself.
-        const double share_frac =
-            column == kNoSample ? 1.0 : model.samples.columns[column].share_frac[l];
-        held_m3 += static_cast<double>(area_m2[s]) * share_frac * cells.thickness_m(l);
+        double own_m2 = area_m2[s];
+        if (column != kNoSample) {
+          own_m2 =
+              model.samples.columns[column].area_m2 * model.samples.columns[column].share_frac[l];
+        }
+        held_m3 += own_m2 * cells.thickness_m(l);
       }
     }
     EXPECT_NEAR(held_m3, each.held_m3, 0.03 * each.held_m3);
@@ -212,7 +234,6 @@ TEST(SurfaceColumns, ConductAlikeInBothDirectionsAndNeverBackwards) {
     Body body(mesh, {{0.002, 50.0, 7800.0, 470.0}, {0.05, 0.04, 30.0, 900.0}}, true);
     ASSERT_NO_FATAL_FAILURE(body.warm_up());
     const SurfaceModel& model = body.model();
-    const auto area_m2 = vertex_areas_m2(model.meshes[0], body.instance());
     std::map<std::tuple<std::uint32_t, std::size_t, std::uint32_t, std::uint32_t>, double> found;
     const auto& columns = model.samples.columns;
     for (std::uint32_t c = 0; c < columns.size(); ++c) {
@@ -221,7 +242,7 @@ TEST(SurfaceColumns, ConductAlikeInBothDirectionsAndNeverBackwards) {
           const CellLink& link = model.samples.links[k];
           EXPECT_GT(link.conductance_w_m2_k, 0.0F);
           found[{c, l, link.column, link.cell}] =
-              static_cast<double>(link.conductance_w_m2_k) * area_m2[columns[c].sample];
+              static_cast<double>(link.conductance_w_m2_k * columns[c].area_m2);
         }
       }
     }
@@ -233,6 +254,102 @@ TEST(SurfaceColumns, ConductAlikeInBothDirectionsAndNeverBackwards) {
       EXPECT_NEAR(back->second, conductance_w_k, 1e-4 * conductance_w_k);
     }
   }
+}
+
+/// Conductance between the body and the ground that it stands on, W/K, from either side.
+std::array<double, 2> into_ground_w_k(double resistance_m2k_w) {
+  Body body(box(0.6F), {{0.1, 1.28, 2300.0, 878.0}}, true);
+  body.put_on_ground({{0.15, 0.7, 2120.0, 920.0}, {0.5, 1.5, 2000.0, 950.0}});
+  if (resistance_m2k_w > 0.0) body.join(resistance_m2k_w);
+  body.warm_up();
+  const SurfaceModel& model = body.model();
+  std::array<double, 2> out{};
+  const auto on_ground = [&](std::uint32_t column) {
+    return model.samples.columns[column].sample >= model.first_sample[1] ? 1U : 0U;
+  };
+  for (std::uint32_t c = 0; c < model.samples.columns.size(); ++c) {
+    const SampleColumn& own = model.samples.columns[c];
+    for (std::uint32_t k = own.first_link.front(); k < own.first_link.back(); ++k) {
+      const CellLink& link = model.samples.links[k];
+      if (on_ground(link.column) == on_ground(c)) continue;
+      out[on_ground(c)] += static_cast<double>(link.conductance_w_m2_k * own.area_m2);
+    }
+  }
+  return out;
+}
+
+TEST(SurfaceColumns, WallsConductIntoTheGroundAtTheirFeetAlikeInBothDirections) {
+  const auto [down, up] = into_ground_w_k(0.0);
+  // The walls of 10 cm cover 0.2 m2 or more of the ground, from some centimetres away.
+  EXPECT_GT(down, 2.0);
+  EXPECT_NEAR(up, down, 1e-3 * down);
+  // A joint lies in series, over the area that the feet cover.
+  const auto [parted, back] = into_ground_w_k(1.0);
+  EXPECT_GT(parted, 0.15);
+  EXPECT_LT(parted, 0.3);
+  EXPECT_NEAR(back, parted, 1e-3 * parted);
+}
+
+TEST(SurfaceColumns, GroundAtTheFootOfASolidIsThatOfAHalfSpaceWithHalfOfItsFaceCovered) {
+  constexpr double kFilm = 0.1;
+  constexpr double kFromK = 280.0;
+  constexpr double kToK = 5280.0;
+  constexpr double kSizeM = 0.6;
+  constexpr double kSeconds = 3.0 * 3600.0;
+  constexpr double kConductivity = 1.28;
+  constexpr double kDiffusivity = kConductivity / (2300.0 * 878.0);
+  // The body keeps its heat to itself. The air gives the open ground nearly the same flux however
+  // warm it gets.
+  Body body(box(static_cast<float>(kSizeM)), {{0.2, 1e-4, 20.0, 500.0}}, true);
+  body.put_on_ground({{1.0, kConductivity, 2300.0, 878.0}});
+  std::vector<scene::WeatherSample> weather(4);
+  for (scene::WeatherSample& sample : weather) {
+    sample.film_w_m2_k = kFilm;
+    sample.air_k = kFromK;
+  }
+  weather[0].sim_time_ns = -1'000'000 * kSecondNs;
+  weather[2].sim_time_ns = kSecondNs;
+  weather[3].sim_time_ns = 1'000'000 * kSecondNs;
+  weather[2].air_k = weather[3].air_k = kToK;
+  body.hang_in_air(weather, kFromK);
+  body.step(200);
+  body.look_closely(3e-3);
+  ASSERT_NO_FATAL_FAILURE(body.warm_up());
+  // Each instant s ago has left q / (rho c) / sqrt(pi a s) times the open share of a spread of
+  // sqrt(2 a s).
+  const auto rise_k = [](double beside_m) {
+    double sum = 0.0;
+    constexpr int kParts = 2000;
+    for (int i = 0; i < kParts; ++i) {
+      const double root = (i + 0.5) / kParts * std::sqrt(kDiffusivity * kSeconds);
+      sum += 2.0 / kParts * std::sqrt(kDiffusivity * kSeconds / physics::kPi) * 0.5 *
+             std::erfc(-0.5 * beside_m / root);
+    }
+    return kFilm * (kToK - kFromK) / kConductivity * sum;
+  };
+  double squares = 0.0;
+  double most_k = 0.0;
+  std::size_t seen = 0;
+  const SurfaceModel& model = body.model();
+  for (std::size_t s = model.first_sample[1]; s < body.samples(); ++s) {
+    const SurfaceSample& sample = model.samples.samples[s];
+    if (sample.covered) continue;
+    const glm::dvec3 at_m = glm::dvec3(sample.position_m) - body.origin_m();
+    const glm::dvec3 in_body_m = at_m - glm::dvec3(4.0, 4.0, 0.0);  // the ground reaches farther
+    const double beside_m = -in_body_m.y;
+    if (in_body_m.x < 0.2 || in_body_m.x > 0.4 || beside_m < 0.0 || beside_m > 0.3) continue;
+    const double off_k = body.temperature_k(s) - kFromK - rise_k(beside_m);
+    ++seen;
+    squares += off_k * off_k;
+    most_k = std::max(most_k, std::abs(off_k));
+  }
+  ASSERT_GT(seen, 100U);
+  RecordProperty("rms_k", std::to_string(std::sqrt(squares / static_cast<double>(seen))));
+  RecordProperty("most_k", std::to_string(most_k));
+  // Far from the foot the ground has warmed by 36 K, at the foot by half of that.
+  EXPECT_NEAR(rise_k(0.0), 0.5 * rise_k(1.0), 1e-6);
+  EXPECT_LT(std::sqrt(squares / static_cast<double>(seen)), 0.3);
+  EXPECT_LT(most_k, 1.0);
 }
 
 /// Share of the step of the air's temperature that a half space has not followed at a depth, with a
@@ -315,25 +432,51 @@ std::pair<double, double> range_k() {
   return {balance_k(std::min(0.9 * 330.0, air)), balance_k(0.7 * (800.0 + 300.0) + air)};
 }
 
+void expect_within_range(Body& body) {
+  const auto [low_k, high_k] = range_k();
+  ASSERT_NO_FATAL_FAILURE(body.warm_up());
+  for (int i = 1; i <= 60; ++i) body.advance((3 * 3600 + 10 * i) * kSecondNs);
+  for (std::size_t s = 0; s < body.samples(); ++s) {
+    EXPECT_GT(body.temperature_k(s), low_k - 0.05);
+    EXPECT_LT(body.temperature_k(s), high_k + 0.05);
+  }
+}
+
+TEST(SurfaceColumns, KeepBodiesOfTheLibraryAtTheirFeetWithinWhatTheirSurroundingsAllow) {
+  const std::vector<scene::Layer> sandwich{{0.0005, 50.0, 7850.0, 470.0},
+                                           {0.1, 0.03, 30.0, 1400.0}};
+  const std::vector<scene::Layer> road{{0.15, 0.7, 2120.0, 920.0}, {0.3, 1.5, 2000.0, 950.0}};
+  const std::vector<scene::Layer> wood{{0.02, 0.15, 550.0, 1700.0}};
+  for (const auto& body_layers : {sandwich, concrete(0.1), wood}) {
+    for (const auto& ground_layers : {road, sandwich}) {
+      SCOPED_TRACE(testing::Message() << body_layers[0].thickness_m << " m on "
+                                      << ground_layers[0].thickness_m << " m");
+      Body body(box(1.5F), body_layers, true);
+      body.put_on_ground(ground_layers);
+      expect_within_range(body);
+    }
+  }
+}
+
 TEST(SurfaceColumns, KeepAnyStackWithinWhatItsSurroundingsAllow) {
   std::mt19937_64 random(7);
   const auto between = [&random](double low, double high) {
     return low * std::pow(high / low, std::uniform_real_distribution<>(0.0, 1.0)(random));
   };
   const std::array<scene::Mesh, 3> shapes{box(1.5F), ell(1.5F), rib(1.5F)};
-  const auto [low_k, high_k] = range_k();
-  for (int n = 0; n < 30; ++n) {
+  const auto any_stack = [&] {
     std::vector<scene::Layer> layers(std::uniform_int_distribution<std::size_t>(1, 4)(random));
     for (scene::Layer& layer : layers) {
       layer = {between(2e-4, 0.5), between(0.02, 400.0), between(20.0, 8000.0), 900.0};
     }
-    Body body(shapes[static_cast<std::size_t>(n) % shapes.size()], layers, true);
-    ASSERT_NO_FATAL_FAILURE(body.warm_up());
-    for (int i = 1; i <= 60; ++i) body.advance((3 * 3600 + 10 * i) * kSecondNs);
-    for (std::size_t s = 0; s < body.samples(); ++s) {
-      EXPECT_GT(body.temperature_k(s), low_k - 0.05) << n;
-      EXPECT_LT(body.temperature_k(s), high_k + 0.05) << n;
-    }
+    return layers;
+  };
+  for (int n = 0; n < 30; ++n) {
+    Body body(shapes[static_cast<std::size_t>(n) % shapes.size()], any_stack(), true);
+    // Every second one stands on ground.
+    if (n % 2 == 1) body.put_on_ground(any_stack());
+    SCOPED_TRACE(n);
+    expect_within_range(body);
   }
 }
 
