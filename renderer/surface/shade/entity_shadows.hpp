@@ -67,10 +67,11 @@ class EntityShadows {
   /// behind it, and a little lower. `corners_m` are those of its box.
   [[nodiscard]] float end_height_m(std::size_t entity, std::span<const glm::vec3, 8> corners_m,
                                    const CasterRays& rays) const noexcept;
-  /// Returns the corners of a level rectangle at the height `at_m` around the shadow there, penumbra
-  /// included. `corners_m` are those of the entity's box, rel.
-  [[nodiscard]] std::array<glm::vec3, 4> rectangle_at(
-      std::size_t entity, std::span<const glm::vec3, 8> corners_m, float at_m) const noexcept;
+  /// Returns the corners of a level rectangle at the height `at_m` around the shadow there,
+  /// penumbra included. `corners_m` are those of the entity's box, rel.
+  [[nodiscard]] std::array<glm::vec3, 4> rectangle_at(std::size_t entity,
+                                                      std::span<const glm::vec3, 8> corners_m,
+                                                      float at_m) const noexcept;
 
   EntityShadowMaps maps_;
   float highest_static_m_ = 0.0F;
