@@ -31,6 +31,9 @@ FILES = {
             "Error and frame time of every method and setting against three-dimensional conduction, whole image. "
             "`embree` recomputes the history with one ray per pixel and step; its time is that of the rays alone.",
             "emit bench error-vs-time --quick --scene block-on-road --frames 3 --refine 0.5"),
+        "error-vs-time-ribbed": (
+            "The same at a wall of thin ribs by night.",
+            "emit bench error-vs-time --quick --scene ribbed --frames 3 --refine 0.5"),
         "error-vs-time-block-h200": (
             "The same on a GPU. `embree` traces with its 16 cores.",
             "emit bench error-vs-time --quick --scene block-on-road --frames 3 --refine 0.5"),
@@ -159,10 +162,13 @@ def paper_tables(rows):
 
 
 def error_tables(rows):
+    def share(name):
+        return lambda row: percent(row[name], 2)
     yield table([("method", field("method")), ("model", field("model")), ("steps", field("steps")),
                  ("spacing", field("spacing")), ("lateral", field("lateral")),
                  ("frame, ms", field("frame_ms_median")), ("RMS, K", field("rms_error_k", 2)),
-                 ("p99, K", field("p99_error_k", 2)), ("nothing beats it", field("pareto"))],
+                 ("p99, K", field("p99_error_k", 2)), ("radiance RMS", share("rms_error_frac")),
+                 ("radiance p99", share("p99_error_frac")), ("nothing beats it", field("pareto"))],
                 [row for row in rows if row["region"] == "all"])
 
 
