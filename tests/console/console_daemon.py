@@ -43,15 +43,22 @@ def replay_console(journal, scenario, overrides, *more):
         [BIN_DIR / "emit", "replay", journal, "--scenario", scenario, *overrides, "--console", "127.0.0.1:0", *more],
         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     reader = None
+    said = []
     try:
         for line in process.stderr:
             if "console=http://" in line:
                 # What follows is read on, so that the pipe does not fill up.
-                reader = threading.Thread(target=process.stderr.read)
+                reader = threading.Thread(target=lambda: said.append(process.stderr.read()))
                 reader.start()
                 yield line.split("console=http://")[1].strip().rstrip("/")
                 return
         raise AssertionError("emit replay has no console")
+    except TimeoutError as error:
+        code = process.poll()
+        process.send_signal(signal.SIGINT)
+        if reader is not None:
+            reader.join(60)
+        raise TimeoutError(f"{error}; emit replay (exit status {code}) said:\n{''.join(said)}") from error
     finally:
         process.send_signal(signal.SIGINT)
         process.wait(60)

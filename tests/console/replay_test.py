@@ -58,8 +58,12 @@ class Replay(unittest.TestCase):
         self.page.wait_for(f"!{STATE}.playing && {STATE}.target_s === null", PATIENCE_S)
 
     def wait_for_frame(self, number):
-        self.page.wait_for(f"{SHOWN} === {number} && {STATE}.target_s === null && {STATE}.frame === {number - 1} && "
-                           f"emitConsole.image.frame.frame_number === {number}", PATIENCE_S)
+        try:
+            self.page.wait_for(f"{SHOWN} === {number} && {STATE}.target_s === null && {STATE}.frame === {number - 1} && "
+                               f"emitConsole.image.frame.frame_number === {number}", PATIENCE_S)
+        except TimeoutError as error:
+            found = self.page.evaluate(f"JSON.stringify([{SHOWN}, {STATE}, emitConsole.image.frame.frame_number])")
+            raise TimeoutError(f"{error}; found {found}") from error
 
     def assert_is_recorded(self):
         """The image on the page is that of the recording: its checksum, and the simulation time where the bar stands."""
@@ -129,7 +133,7 @@ class Replay(unittest.TestCase):
             self.assertEqual([url for url in self.page.requests if not url.startswith(own)], [])
 
     def test_a_step_a_rate_and_a_loop(self):
-        with replay_console(self.daemon.journal, SCENARIO, self.daemon.overrides, "--speed", "0.01") as address:
+        with replay_console(self.daemon.journal, SCENARIO, self.daemon.overrides, "--speed", "0.0001") as address:
             self.open(address)
             # A toast goes after some seconds, and a busy machine may look too late.
             self.page.evaluate("(() => { window.toasts = ''; new MutationObserver(() => window.toasts += "
