@@ -55,7 +55,8 @@ class Replay(unittest.TestCase):
 
     def hold(self):
         self.page.press("h")
-        self.page.wait_for(f"!{STATE}.playing && {STATE}.target_s === null", PATIENCE_S)
+        # The image comes by itself, and may be one frame behind the state.
+        self.page.wait_for(f"!{STATE}.playing && {STATE}.target_s === null && {SHOWN} === {STATE}.frame + 1", PATIENCE_S)
 
     def wait_for_frame(self, number):
         try:
