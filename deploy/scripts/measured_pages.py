@@ -28,7 +28,8 @@ FILES = {
             "The same on a GPU.",
             "emit bench paper --scene box --steps 27 --no-errors"),
         "error-vs-time-block": (
-            "Error and frame time of every method and setting against three-dimensional conduction, whole image. "
+            "Error, in kelvin and in per cent of the radiance, and frame time of every method and setting against "
+            "three-dimensional conduction, whole image. "
             "`embree` recomputes the history with one ray per pixel and step; its time is that of the rays alone.",
             "emit bench error-vs-time --quick --scene block-on-road --frames 3 --refine 0.5"),
         "error-vs-time-ribbed": (
@@ -163,12 +164,12 @@ def paper_tables(rows):
 
 def error_tables(rows):
     def share(name):
-        return lambda row: percent(row[name], 2)
+        return lambda row: percent(row[name], 2).removesuffix(" %")
     yield table([("method", field("method")), ("model", field("model")), ("steps", field("steps")),
                  ("spacing", field("spacing")), ("lateral", field("lateral")),
                  ("frame, ms", field("frame_ms_median")), ("RMS, K", field("rms_error_k", 2)),
-                 ("p99, K", field("p99_error_k", 2)), ("radiance RMS", share("rms_error_frac")),
-                 ("radiance p99", share("p99_error_frac")), ("nothing beats it", field("pareto"))],
+                 ("p99, K", field("p99_error_k", 2)), ("RMS, %", share("rms_error_frac")),
+                 ("p99, %", share("p99_error_frac")), ("nothing beats it", field("pareto"))],
                 [row for row in rows if row["region"] == "all"])
 
 

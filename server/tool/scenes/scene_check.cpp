@@ -196,7 +196,7 @@ class Check {
     if (!std::isfinite(ground_m)) return std::nullopt;
     const glm::dvec3 size_m = bounds.max_m - bounds.min_m;
     constexpr double kSlackFrac = 0.05;
-    // What stands on a slope has ground beside it that is higher than its lowest wheel.
+    // A thing on a slope has ground beside it that is higher than its lowest wheel.
     const double slack_m =
         std::max(0.02, kSlackFrac * size_m.z) + 0.5 * slope * std::max(size_m.x, size_m.y);
     return Footing{sim_time_ns, bounds.min_m.z - ground_m, slack_m};
