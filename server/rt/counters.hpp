@@ -28,7 +28,7 @@ namespace emit::server {
   X(frames_coarse_meshes, "of them: meshes were simplified visibly")                        \
   X(frames_coarse_shade, "of them: entities' shade found no room, or moved too fast")       \
   X(frames_coarse_shadows, "of them: more entities turned than get shadow maps at once")    \
-  X(frames_coarse_weather, "of them: surfaces that lack a change of weather or shade yet")  \
+  X(frames_coarse_weather, "of them: surfaces lack a change of the weather by the host")    \
   X(frames_coarse_edges, "of them: heat near edges not settled to 0.05 K yet")              \
   X(targets_plain, "small targets drawn plainly: too many in a frame for windows")          \
   X(frames_wet_unknown, "frames after rain on materials that state no store of water")      \

@@ -49,7 +49,7 @@ inline void add(CoarseReasons& reasons, CoarseReason which, bool holds = true) n
       "meshes lost visible detail to leave room within thermal.max_samples",
       "the shade of entities found no room, or an entity was too fast, or time went back",
       "more entities turned than a frame makes shadow maps for: outlines are of a while ago",
-      "some surfaces have not taken in a change of the weather or of shade yet",
+      "some surfaces have not taken in a change of the weather by the host yet",
       "heat along surfaces near edges is not settled to 0.05 K yet",
       "the surface was prepared anew, because the thermal time jumped"};
   return kTexts[static_cast<std::size_t>(which)];
