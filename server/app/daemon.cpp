@@ -71,6 +71,7 @@ FrameSourceFactory DaemonImpl::source_factory() {
 }
 
 bool DaemonImpl::warming_up(double done_frac) {
+  liveness_.warmed_up_frac.store(done_frac, std::memory_order_relaxed);
   log_.warming_up(done_frac);
   return health_.warming_up(done_frac);
 }
@@ -117,6 +118,10 @@ physics::Result<void> DaemonImpl::setup() {
       return checked;
     }
   }
+  if (auto opened = open_endpoint(); !opened) {
+    return opened;
+  }
+  log_.write(LogLevel::info, "event=listening " + addresses());
   if (auto started = agents_.start_render(source_factory()); !started) {
     return started;
   }
@@ -171,25 +176,39 @@ physics::Result<void> DaemonImpl::make_agents() {
   if (auto made = agents_.make_runners(); !made) {
     return made;
   }
-  return open_endpoint(names);
+  if (endpoint_) {
+    endpoint_->serve(agents_.duty_cycles(), build_labels(names));
+  }
+  return open_console(names);
 }
 
-physics::Result<void> DaemonImpl::open_endpoint(const ProcessNames& names) {
-  const MetricsEndpoint::Parts parts{context_,           liveness_,
-                                     log_.board(),       realtime_,
-                                     agents_.receiver(), agents_.duty_cycles(),
-                                     ptp_.get(),         config_.motion.enabled()};
-  auto opened = MetricsEndpoint::open(config_, parts,
-                                      {{"version", kVersion},
-                                       {"commit", kCommit},
-                                       {"device", names.device},
-                                       {"scenario", names.scenario},
-                                       {"pacing", names.pacing}});
+MetricsText::Labels DaemonImpl::build_labels(const ProcessNames& names) {
+  return {{"version", kVersion},
+          {"commit", kCommit},
+          {"device", names.device},
+          {"scenario", names.scenario},
+          {"pacing", names.pacing}};
+}
+
+physics::Result<void> DaemonImpl::open_endpoint() {
+  const MetricsEndpoint::Parts parts{context_,
+                                     liveness_,
+                                     log_.board(),
+                                     realtime_,
+                                     agents_.receiver(),
+                                     ptp_.get(),
+                                     config_.motion.enabled()};
+  // The device is not known before the source is made.
+  const ProcessNames names{build_text("emitd"),
+                           scenario_ ? scenario_->name : std::string(),
+                           std::string(pacing_name(config_.pacing.mode)),
+                           {}};
+  auto opened = MetricsEndpoint::open(config_, parts, build_labels(names));
   if (!opened) {
     return tl::unexpected<Error>(std::move(opened.error()));
   }
   endpoint_ = std::move(*opened);
-  return open_console(names);
+  return {};
 }
 
 physics::Result<void> DaemonImpl::open_console(const ProcessNames& names) {
@@ -292,8 +311,12 @@ physics::Result<void> DaemonImpl::check_realtime() {
 }
 
 std::string DaemonImpl::ready_line() const {
+  return "ready " + addresses();
+}
+
+std::string DaemonImpl::addresses() const {
   const SocketAddress host = agents_.receiver().host_address();
-  return fmt::format("ready control={} host_udp={}{}{}{}",
+  return fmt::format("control={} host_udp={}{}{}{}",
                      to_string(agents_.receiver().control_address()),
                      host.length != 0 ? to_string(host) : std::string("off"),
                      triggers_ ? " trigger=" + to_string(triggers_->address()) : std::string(),
@@ -308,6 +331,7 @@ int DaemonImpl::run() {
     log_.finish(kLogEndNs);
     return 1;
   }
+  liveness_.warmed_up_frac.store(1.0, std::memory_order_relaxed);
   liveness_.serving.store(true, std::memory_order_release);
   health_.ready(ready_line());
   log_.write(LogLevel::info, ready_line());

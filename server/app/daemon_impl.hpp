@@ -18,6 +18,7 @@
 #include "app/process_names.hpp"
 #include "app/service_health.hpp"
 #include "net/trigger_port.hpp"
+#include "telemetry/metrics_text.hpp"
 #include "telemetry/ptp_monitor.hpp"
 
 namespace emit::server {
@@ -74,7 +75,10 @@ class DaemonImpl final : public Daemon {
   [[nodiscard]] physics::Result<void> check_realtime();
   [[nodiscard]] physics::Result<void> make_agents();
   void log_start(const ProcessNames& names);
-  [[nodiscard]] physics::Result<void> open_endpoint(const ProcessNames& names);
+  [[nodiscard]] physics::Result<void> open_endpoint();
+  [[nodiscard]] static MetricsText::Labels build_labels(const ProcessNames& names);
+  /// Returns the addresses that are open by now.
+  [[nodiscard]] std::string addresses() const;
   [[nodiscard]] physics::Result<void> open_console(const ProcessNames& names);
   /// Runs one turn of the main thread while serving: waits up to 100 ms, then checks the agents.
   void watch_once();

@@ -9,9 +9,10 @@
 namespace emit::server {
 
 /// Signs of life of the process: whether it serves, since when it runs, and when main last came
-/// round. Threads: main writes, the thread of the metrics reads.
+/// round. Threads: main writes unless a member says otherwise, the thread of the metrics reads.
 struct Liveness {
   std::atomic<bool> serving{false};           ///< true from the start of the agents to the stop
+  std::atomic<double> warmed_up_frac{0.0};    ///< 0 .. 1; by the render agent's thread
   std::atomic<std::int64_t> housekept_ns{0};  ///< monotonic
   std::int64_t started_ns = 0;                ///< monotonic; fixed before the metrics are served
 

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/metrics_endpoint.hpp"
 
+#include <fmt/format.h>
+
+#include <cmath>
 #include <optional>
 #include <utility>
 
@@ -32,22 +35,30 @@ physics::Result<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::open(
 }
 
 MetricsEndpoint::MetricsEndpoint(const Parts& parts, MetricsText::Labels build) : parts_(parts) {
-  sources_.counters = &parts_.context.counters;
-  sources_.times = &parts_.context.times;
-  sources_.prediction = &parts_.context.prediction;
-  sources_.motion = parts_.motion ? &parts_.context.motion_times : nullptr;
-  sources_.realtime = &parts_.realtime;
-  sources_.clients = parts_.context.clients();
-  sources_.board = &parts_.board;
-  sources_.agents = parts_.duty_cycles;
-  sources_.build = std::move(build);
+  starting_.counters = &parts_.context.counters;
+  starting_.times = &parts_.context.times;
+  starting_.prediction = &parts_.context.prediction;
+  starting_.motion = parts_.motion ? &parts_.context.motion_times : nullptr;
+  starting_.realtime = &parts_.realtime;
+  starting_.clients = parts_.context.clients();
+  starting_.board = &parts_.board;
+  starting_.build = std::move(build);
+}
+
+void MetricsEndpoint::serve(const NamedDutyCycles& duty_cycles, MetricsText::Labels build) {
+  serving_ = starting_;
+  serving_.agents = duty_cycles;
+  serving_.build = std::move(build);
+  sources_.store(&serving_, std::memory_order_release);
 }
 
 MetricsServer::Answers MetricsEndpoint::answers() const {
   MetricsServer::Answers answers;
-  answers.metrics = [this] { return metrics_text(sources_, moment()); };
+  answers.metrics = [this] {
+    return metrics_text(*sources_.load(std::memory_order_acquire), moment());
+  };
   answers.trace = [this] { return chrome_trace(parts_.context.trace.entries()); };
-  answers.ready = [this] { return parts_.liveness.is_ready(parts_.context); };
+  answers.why_not_ready = [this] { return why_not_ready(); };
   answers.admits = [this](const SocketAddress& peer) { return admits(peer); };
   answers.healthy = [this] { return is_healthy(); };
   return answers;
@@ -58,6 +69,7 @@ MetricsMoment MetricsEndpoint::moment() const {
   const std::int64_t now_ns = context.clock.monotonic_ns();
   return {context.run_id.load(std::memory_order_relaxed),
           parts_.liveness.is_ready(context),
+          parts_.liveness.warmed_up_frac.load(std::memory_order_relaxed),
           now_ns - parts_.liveness.started_ns,
           now_ns,
           context.journal_memory_bytes.load(std::memory_order_relaxed),
@@ -77,9 +89,24 @@ bool MetricsEndpoint::admits(const SocketAddress& peer) const {
 }
 
 bool MetricsEndpoint::is_healthy() const {
+  const MetricsSources* const sources = sources_.load(std::memory_order_acquire);
+  // Main waits for the warm-up, which may take minutes; a start that fails ends the process.
+  if (sources == &starting_) return true;
   const std::int64_t now_ns = parts_.context.clock.monotonic_ns();
   return parts_.liveness.is_main_alive(now_ns) &&
-         ServiceHealth::stuck_agent(sources_.agents, now_ns, ServiceHealth::kStuckNs).empty();
+         ServiceHealth::stuck_agent(sources->agents, now_ns, ServiceHealth::kStuckNs).empty();
+}
+
+std::string MetricsEndpoint::why_not_ready() const {
+  if (parts_.liveness.is_ready(parts_.context)) return {};
+  if (sources_.load(std::memory_order_acquire) == &starting_) {
+    const double frac = parts_.liveness.warmed_up_frac.load(std::memory_order_relaxed);
+    return fmt::format("emitd starts; its surface is warmed up to {:.0f} %",
+                       std::floor(100.0 * frac));
+  }
+  return parts_.liveness.serving.load(std::memory_order_acquire)
+             ? "the surface warms up again behind a jump of simulation time"
+             : "emitd begins to serve, or stops";
 }
 
 }  // namespace emit::server

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "telemetry/metrics_server.hpp"
 
+#include <fmt/format.h>
+
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
@@ -12,6 +14,7 @@
 #include <boost/beast/http/write.hpp>
 #include <chrono>
 #include <exception>
+#include <string_view>
 #include <thread>
 #include <utility>
 
@@ -35,9 +38,9 @@ Response answer_to(const http::request<http::empty_body>& request,
   response.set(http::field::content_type, "text/plain; version=0.0.4; charset=utf-8");
   // Scrapers add parameters to the path; no answer depends on them.
   const auto target = request.target().substr(0, request.target().find('?'));
-  const auto say_whether = [&](bool good) {
+  const auto say_whether = [&](bool good, std::string_view reason) {
     response.result(good ? http::status::ok : http::status::service_unavailable);
-    response.body() = good ? "yes\n" : "no\n";
+    response.body() = good ? "yes\n" : fmt::format("no{}{}\n", reason.empty() ? "" : ": ", reason);
   };
   const bool head = request.method() == http::verb::head;
   if (!head && request.method() != http::verb::get) {
@@ -49,9 +52,10 @@ Response answer_to(const http::request<http::empty_body>& request,
     response.set(http::field::content_type, "application/json");
     response.body() = answers.trace();
   } else if (target == "/healthz") {
-    say_whether(answers.healthy());
+    say_whether(answers.healthy(), {});
   } else if (target == "/readyz") {
-    say_whether(answers.ready());
+    const std::string reason = answers.why_not_ready();
+    say_whether(reason.empty(), reason);
   } else {
     response.result(http::status::not_found);
     response.body() = "there are /metrics, /trace, /healthz and /readyz\n";

@@ -23,7 +23,8 @@ class MetricsServer {
     std::function<std::string()> metrics;  ///< body of /metrics
     std::function<std::string()> trace;    ///< body of /trace, JSON
     std::function<bool()> healthy;         ///< /healthz: 200 or 503
-    std::function<bool()> ready;           ///< /readyz: 200 or 503
+    /// /readyz: 503 and this reason, or 200 where it is empty.
+    std::function<std::string()> why_not_ready;
     /// Whether this peer may ask; others are closed at once.
     std::function<bool(const SocketAddress&)> admits;
   };

@@ -37,6 +37,8 @@ void add_state(MetricsText& out, const MetricsSources& sources, const MetricsMom
   out.sample({{"run_id", std::to_string(moment.run_id)}}, std::uint64_t{1});
   out.family("ready", "gauge", "1 while host frames are taken");
   out.sample({}, std::uint64_t{moment.ready ? 1U : 0U});
+  out.family("warmed_up_ratio", "gauge", "Share of the start's warm-up that is done, 0 to 1");
+  out.sample({}, moment.warmed_up_frac);
   out.family("uptime_seconds", "gauge", "Time since the daemon began");
   out.sample({}, seconds(moment.uptime_ns));
   out.family("journal_memory_bytes", "gauge",

@@ -57,6 +57,7 @@ struct MetricsSources {
 struct MetricsMoment {
   std::uint64_t run_id = 0;
   bool ready = false;
+  double warmed_up_frac = 0.0;  ///< 0 .. 1
   std::int64_t uptime_ns = 0;
   std::int64_t now_ns = 0;                 ///< monotonic
   std::uint64_t journal_memory_bytes = 0;  ///< Context::journal_memory_bytes

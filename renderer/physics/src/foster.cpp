@@ -2,8 +2,9 @@
 #include "emit/physics/foster.hpp"
 
 #include <algorithm>
-#include <experimental/simd>
 #include <type_traits>
+
+#include "emit/physics/surface/wide_lanes.hpp"
 
 namespace emit::physics {
 
@@ -127,18 +128,18 @@ FosterAdvance advance_controlled(FosterState<Real>& x, const FosterDrive<Real>& 
   return result;
 }
 
-/// Surfaces side by side.
-using Lanes = std::experimental::fixed_size_simd<double, kFosterLanes>;
-
-/// Returns one value of every lane; `value` takes the number of the lane.
-template <class Value>
-Lanes gathered(const Value& value) noexcept {
-  return Lanes([&](auto lane) { return value(static_cast<std::size_t>(lane)); });
-}
+static_assert(kFosterLanes == kWideLanes);
 
 /// Advances as many surfaces as there are lanes.
-void advance_lanes(const std::array<const FosterLane*, kFosterLanes>& lanes,
-                   double tolerance_k) noexcept {
+template <class Lanes>
+[[gnu::always_inline]] inline void advance_lanes(
+    const std::array<const FosterLane*, kFosterLanes>& lanes, double tolerance_k) noexcept {
+  // Takes one value a lane; `value` takes the number of the lane.
+  const auto gathered = [](const auto& value) {
+    std::array<double, kFosterLanes> out;
+    for (std::size_t l = 0; l < kFosterLanes; ++l) out[l] = value(l);
+    return Lanes(out);
+  };
   const auto drive = [&](FosterDrive<double> FosterLane::*which) {
     return FosterDrive<Lanes>{
         gathered([&](std::size_t l) { return (lanes[l]->*which).absorbed_w_m2; }),
@@ -186,14 +187,46 @@ FosterAdvance foster_advance(FosterState<double>& x, const FosterDrive<double>& 
       tolerance_k);
 }
 
+namespace {
+
+using AdvanceGroup = void (*)(const std::array<const FosterLane*, kFosterLanes>& lanes,
+                              double tolerance_k) noexcept;
+
+/// `flatten` inlines all that is called, so that it is compiled for these registers.
+[[gnu::flatten]] void advance_plain(const std::array<const FosterLane*, kFosterLanes>& lanes,
+                                    double tolerance_k) noexcept {
+  advance_lanes<WideLanes<16>>(lanes, tolerance_k);
+}
+
+// clang inlines no function into one of another target, so it takes the plain one.
+#if defined(__x86_64__) && !defined(__clang__)
+#define EMIT_HAS_AVX2_LANES
+[[gnu::flatten, gnu::target("avx2")]] void advance_avx2(
+    const std::array<const FosterLane*, kFosterLanes>& lanes, double tolerance_k) noexcept {
+  advance_lanes<WideLanes<32>>(lanes, tolerance_k);
+}
+#endif
+
+/// Returns the fastest function that this machine runs. All have the same bits, because none fuses
+/// multiplications with additions.
+AdvanceGroup fastest_advance() noexcept {
+#if defined(EMIT_HAS_AVX2_LANES)
+  if (__builtin_cpu_supports("avx2")) return advance_avx2;
+#endif
+  return advance_plain;
+}
+
+}  // namespace
+
 void foster_advance_all(std::span<const FosterLane> lanes, double tolerance_k) noexcept {
+  static const AdvanceGroup advance = fastest_advance();
   while (lanes.size() > 1) {
     // Fill lanes without a surface with the first one, whose result is stored again.
     std::array<const FosterLane*, kFosterLanes> group;
     group.fill(&lanes.front());
     const std::size_t count = std::min(lanes.size(), kFosterLanes);
     for (std::size_t l = 0; l < count; ++l) group[l] = &lanes[l];
-    advance_lanes(group, tolerance_k);
+    advance(group, tolerance_k);
     lanes = lanes.subspan(count);
   }
   for (const FosterLane& lane : lanes) {

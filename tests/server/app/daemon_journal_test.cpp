@@ -152,6 +152,57 @@ class InProcess : public ::testing::Test {
   std::uint64_t number_ = 0;
 };
 
+TEST(DaemonStart, SaysOverHttpThatItIsThereAndNotReadyWhileTheSourceIsMade) {
+  config::DaemonConfig config;
+  config.host.udp = "127.0.0.1:0";
+  config.control.tcp = "127.0.0.1:0";
+  config.metrics.listen = "127.0.0.1:0";
+  test::SourceScript script;
+  std::string metrics_url;
+  std::string ready;
+  std::string health;
+  std::string metrics;
+  const auto body_of = [&](const std::string& path) {
+    const auto answer = client::http_get(metrics_url + path, kLongNs);
+    return answer ? std::to_string(answer->status) + " " + answer->body : answer.error().text;
+  };
+  DaemonOptions options;
+  options.on_log = [&](const std::string& line) {
+    const auto begin = line.find("event=listening");
+    if (begin == std::string::npos) return;
+    const auto address = line.find(" metrics=", begin) + std::string_view(" metrics=").size();
+    metrics_url = "http://" + line.substr(address, line.find_first_of(" \n", address) - address);
+  };
+  options.source_factory = [&] {
+    ready = body_of("/readyz");
+    health = body_of("/healthz");
+    metrics = body_of("/metrics");
+    return physics::Result<std::unique_ptr<FrameSource>>(
+        std::make_unique<test::ScriptedSource>(script, 32, 16, 7));
+  };
+  auto daemon = Daemon::create(config, std::nullopt, options);
+  ASSERT_TRUE(daemon.has_value()) << daemon.error().text;
+  EXPECT_EQ(ready, "503 no: emitd starts; its surface is warmed up to 0 %\n") << metrics_url;
+  EXPECT_EQ(health, "200 yes\n");
+  ASSERT_EQ(metrics.substr(0, 4), "200 ") << metrics;
+  const Exposition starting(metrics.substr(4));
+  EXPECT_EQ(starting.fault(), "");
+  EXPECT_EQ(starting.value("emitd_ready"), 0.0);
+  EXPECT_EQ(starting.value("emitd_warmed_up_ratio"), 0.0);
+
+  std::thread thread([&] { (*daemon)->run(); });
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  while (body_of("/readyz") != "200 yes\n" && std::chrono::steady_clock::now() < end) {
+    std::this_thread::yield();
+  }
+  EXPECT_EQ(body_of("/readyz"), "200 yes\n");
+  const Exposition serving(body_of("/metrics").substr(4));
+  EXPECT_EQ(serving.value("emitd_ready"), 1.0);
+  EXPECT_EQ(serving.value("emitd_warmed_up_ratio"), 1.0);
+  (*daemon)->request_stop();
+  thread.join();
+}
+
 TEST_F(InProcess, ALateRecorderLearnsWhichEntriesItLacksAndTheToolSaysSo) {
   config::DaemonConfig config;
   config.journal.memory_mib = 1;

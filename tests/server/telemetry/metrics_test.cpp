@@ -45,7 +45,7 @@ struct Sources {
     sources.build = {{"version", "1.2"}, {"device", "a \"b\" \\ c\nd"}};
     sources.prediction = &context.prediction;
     sources.realtime = &realtime;
-    return metrics_text(sources, {7, true, 1'500'000'000, 9'000'000'000, 4096, ptp});
+    return metrics_text(sources, {7, true, 1.0, 1'500'000'000, 9'000'000'000, 4096, ptp});
   }
 };
 

@@ -278,7 +278,7 @@ template <class Real>
 /// Returns the drive between `a` (f = 0) and `b` (f = 1), linear in f.
 template <class Real>
 [[nodiscard]] constexpr FosterDrive<Real> lerp(const FosterDrive<Real>& a,
-                                               const FosterDrive<Real>& b, Real f) noexcept {
+                                               const FosterDrive<Real>& b, const Real& f) noexcept {
   return {a.absorbed_w_m2 + (b.absorbed_w_m2 - a.absorbed_w_m2) * f,
           a.film_w_m2_k + (b.film_w_m2_k - a.film_w_m2_k) * f,
           a.air_offset_k + (b.air_offset_k - a.air_offset_k) * f,

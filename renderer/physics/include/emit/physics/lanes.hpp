@@ -4,8 +4,8 @@
 #include <utility>
 
 /// One source for scalars and for SIMD lanes: templates over `Real` take float, double, or several
-/// doubles side by side (std::experimental::simd). Every lane has the bits of the scalar result,
-/// because each operation is that of IEEE 754, in the same order. Any thread. RT-safe.
+/// doubles side by side (a class with these operators). Every lane has the bits of the scalar
+/// result, because each operation is that of IEEE 754, in the same order. Any thread. RT-safe.
 namespace emit::physics {
 
 template <class Real>
@@ -34,9 +34,7 @@ template <class Flags, class Real>
   if constexpr (std::is_same_v<Flags, bool>) {
     return flags ? yes : no;
   } else {
-    Real out = no;
-    where(flags, out) = yes;
-    return out;
+    return select(flags, yes, no);
   }
 }
 
