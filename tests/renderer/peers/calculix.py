@@ -487,7 +487,8 @@ def compare(scene, options):
     faces, at, judge, sun = [], [], [], []
     for node, beside in sorted(around.items()):
         face = mesh.faces[beside[0]]
-        if len(beside) < 4 or face["cavity"] or len({(mesh.faces[i]["axis"], mesh.faces[i]["road"]) for i in beside}) > 1:
+        kinds = {(mesh.faces[i]["axis"], mesh.faces[i]["road"]) for i in beside}
+        if len(beside) < 4 or face["cavity"] or len(kinds) > 1:
             continue
         place = mesh.nodes_m[node - 1]
         if face["road"] and min(math.hypot(*np.maximum(np.maximum(b[0] - place, place - b[1]), 0.0)[:2])
@@ -538,8 +539,8 @@ def compare(scene, options):
                          np.percentile(np.abs(d), 99), np.abs(d).max()))
             print(f"  {side:6} {part:24} {len(d):5} mean {d.mean():+.3f} rms {rows[-1][5]:.3f} p99 {rows[-1][6]:.3f} "
                   f"max {rows[-1][7]:.3f}", flush=True)
-        np.savez(folder / f"{scene.name}-{side}.npz", at=at, normals=normals, road=road, away=away, judge=judge, off=off,
-                 sun=sun)
+        np.savez(folder / f"{scene.name}-{side}.npz", at=at, normals=normals, road=road, away=away, judge=judge,
+                 off=off, sun=sun)
     return rows
 
 
