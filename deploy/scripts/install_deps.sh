@@ -19,7 +19,7 @@ runtime=(libegl-mesa0 libgl1-mesa-dri xvfb xauth)
 checkers=(clang-format clang-tidy clang libclang-rt-dev python3 tshark chromium python3-websockets)
 yardsticks=(iperf3 libzmq3-dev iceoryx libiceoryx-posh-dev)
 docs=(python3 mkdocs mkdocs-material)
-peers=(gpsd-tools proj-bin ffmpeg gdal-bin slurmctld slurmd slurm-client munge)
+peers=(gpsd-tools proj-bin ffmpeg gdal-bin slurmctld slurmd slurm-client munge calculix-ccx)
 node_peers=(@mcap/core@2 @mcap/support@1 @foxglove/schemas@2 protobufjs@7 open-dis@1 gps@0.9)
 peers_folder=${EMIT_PEERS_DIR:-${XDG_CACHE_HOME:-$HOME/.cache}/emit/peers}
 
