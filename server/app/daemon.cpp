@@ -121,7 +121,8 @@ physics::Result<void> DaemonImpl::setup() {
   if (auto opened = open_endpoint(); !opened) {
     return opened;
   }
-  log_.write(LogLevel::info, "event=listening " + addresses());
+  log_.write(LogLevel::info,
+             fmt::format("event=listening software=\"{}\" {}", build_text("emitd"), addresses()));
   if (auto started = agents_.start_render(source_factory()); !started) {
     return started;
   }
