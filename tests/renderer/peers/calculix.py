@@ -467,7 +467,7 @@ def compare(scene, options):
     folder = options.folder
     mesh = Mesh(scene, options.least_m, options.growth, options.most_m)
     print(f"{scene.name}: {len(mesh.nodes_m)} nodes, {len(mesh.cells)} cells", flush=True)
-    kept = folder / f"{scene.name}-{options.least_m}-{options.step_s}.npz"
+    kept = folder / f"{scene.name}-{options.least_m}-{options.growth}-{options.most_m}-{options.step_s}.npz"
     if kept.exists():
         data = np.load(kept)
         final, before, sun_then = data["final"], data["before"], data["sun"]
@@ -530,6 +530,9 @@ def compare(scene, options):
     rows = []
     for side, table in results.items():
         off = np.array([row[0] for row in table]) - judge
+        if not np.isfinite(off).all():
+            print(f"  {side:6} {np.count_nonzero(~np.isfinite(off))} of {len(off)} points have no temperature and are "
+                  "left out", flush=True)
         for part, where in parts.items():
             good = where & np.isfinite(off)
             if not good.any():
