@@ -32,7 +32,8 @@ renderer/surface/rays: renderer/embree renderer/history renderer/physics rendere
 renderer/surface/model: renderer/history renderer/physics renderer/scene renderer/surface/heat renderer/surface/mesh renderer/surface/rays
 renderer/surface/shade: renderer/history renderer/physics renderer/scene renderer/threads renderer/shaders/shared renderer/surface/heat renderer/surface/mesh renderer/surface/rays
 renderer/surface/state: renderer/history renderer/physics renderer/scene renderer/surface/mesh renderer/surface/model
-renderer/surface/warm_up: renderer/physics renderer/threads renderer/surface/heat renderer/surface/mesh renderer/surface/model renderer/surface/rays
+renderer/surface/columns: renderer/physics renderer/threads renderer/surface/heat renderer/surface/mesh renderer/surface/model renderer/surface/rays
+renderer/surface/warm_up: renderer/physics renderer/threads renderer/surface/columns renderer/surface/heat renderer/surface/mesh renderer/surface/model renderer/surface/rays
 renderer/surface/run: renderer/history renderer/physics renderer/scene renderer/threads renderer/surface/heat renderer/surface/mesh renderer/surface/model renderer/surface/rays renderer/surface/shade renderer/surface/state renderer/surface/warm_up
 renderer/draw: renderer/gl renderer/history renderer/physics renderer/scene renderer/shaders/shared renderer/threads renderer/surface/mesh renderer/surface/run
 renderer/passes: renderer/draw renderer/gl renderer/physics renderer/scene renderer/shaders/shared renderer/surface/run

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "emit/physics/check.hpp"
+#include "surface/columns/surface_columns.hpp"
 #include "surface/rays/ray_offsets.hpp"
-#include "surface/warm_up/surface_columns.hpp"
 
 namespace emit::renderer {
 

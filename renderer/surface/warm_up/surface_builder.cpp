@@ -11,6 +11,7 @@
 #include <span>
 
 #include "emit/threads/parallel.hpp"
+#include "surface/columns/surface_columns.hpp"
 #include "surface/mesh/refined_mesh_edges.hpp"
 #include "surface/mesh/sheet_sides.hpp"
 #include "surface/model/body_nodes.hpp"
@@ -19,7 +20,6 @@
 #include "surface/warm_up/clutter_twins.hpp"
 #include "surface/warm_up/facet_edges.hpp"
 #include "surface/warm_up/sample_numbers.hpp"
-#include "surface/warm_up/surface_columns.hpp"
 #include "surface/warm_up/surface_exchange.hpp"
 #include "surface/warm_up/surface_patch.hpp"
 #include "surface/warm_up/surface_refinement.hpp"

@@ -52,6 +52,13 @@ class Check {
     constexpr double kFlatFrac = 0.05;
     return size_m.z < kFlatFrac * std::max(size_m.x, size_m.y);
   }
+  /// Land with hills, which may have any size: no vehicle is as low for its width.
+  static bool is_land(const glm::dvec3& size_m) {
+    constexpr double kLeastM = 500.0;
+    constexpr double kLowFrac = 0.2;
+    const double narrower_m = std::min(size_m.x, size_m.y);
+    return narrower_m > kLeastM && size_m.z < kLowFrac * narrower_m;
+  }
 
   void check_object(std::uint32_t index) {
     const scene::ObjectDesc& object = scenario_.objects[index];
@@ -84,7 +91,7 @@ class Check {
 
   void check_units(const scene::ObjectDesc& object, const glm::dvec3& size_m) {
     const double largest_m = std::max({size_m.x, size_m.y, size_m.z});
-    if (is_flat(size_m) && largest_m > 1.0) return;  // ground may have any size
+    if ((is_flat(size_m) && largest_m > 1.0) || is_land(size_m)) return;
     const double scale = likely_scale(largest_m);
     if (scale == 1.0) {
       check_normalised(object, size_m);

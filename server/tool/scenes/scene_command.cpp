@@ -40,6 +40,7 @@ struct NewOptions {
   std::filesystem::path out;
   SkeletonOptions skeleton;
   double ground_m = 0.0;  ///< 0: twenty times the model
+  double length_m = 0.0;  ///< of the model's longest side; 0: as the file says
   bool no_ground = false;
 };
 
@@ -116,7 +117,8 @@ int run_new(const NewOptions& command) {
   const scene::Aabb& box = model->bounds_body;
   const double largest_m =
       std::max({box.max_m.x - box.min_m.x, box.max_m.y - box.min_m.y, box.max_m.z - box.min_m.z});
-  skeleton.scale = likely_scale(largest_m);
+  skeleton.scale = command.length_m > 0.0 ? command.length_m / largest_m : likely_scale(largest_m);
+  skeleton.scale_is_guessed = !(command.length_m > 0.0);
   if (auto made = make_ground(command, skeleton.scale * largest_m, skeleton); !made) {
     return fail_call(made.error());
   }
@@ -134,9 +136,11 @@ int run_new(const NewOptions& command) {
     skeleton.weather = {scenario->clear_sky.air_mean_k, scenario->clear_sky.dew_point_k};
   }
   print_materials(materials);
-  if (skeleton.scale != 1.0) {
-    warn(fmt::format("the model is {:.4g} m long: scale = {:g} is set; review it", largest_m,
-                     skeleton.scale));
+  if (skeleton.scale != 1.0 && skeleton.scale_is_guessed) {
+    warn(
+        fmt::format("the model is {:.4g} m long: scale = {:g} is set; review it, or give its "
+                    "true length with --length-m",
+                    largest_m, skeleton.scale));
   }
   fmt::print(
       "{}: review the materials, then `emit scene check {}` and `emit scene preview {} --out "
@@ -260,6 +264,11 @@ void add_new_options(CommandLine& line, NewOptions& options) {
   line.option("--default-material", options.skeleton.default_material,
               "Library material of what no name tells")
       .type_name("MATERIAL")
+      .show_default();
+  line.option("--length-m", options.length_m,
+              "Length of the model's longest side; 0: as the file says, or by another unit of "
+              "length where that is unlikely")
+      .in_range(0.0, 1e5)
       .show_default();
   line.option("--ground", options.skeleton.ground_material, "Library material of the ground")
       .type_name("MATERIAL")

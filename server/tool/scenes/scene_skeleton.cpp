@@ -60,8 +60,9 @@ std::string skeleton_text(const scene::SceneSummary& model,
   out += fmt::format("[[object]]\nname = {}\ngltf = {}\n", toml_quoted(options.name),
                      toml_quoted(options.gltf));
   if (options.scale != 1.0) {
-    out += fmt::format("scale = {}                    # guessed from its size: REVIEW\n",
-                       options.scale);
+    out += fmt::format("scale = {}                    # {}\n", options.scale,
+                       options.scale_is_guessed ? "guessed from its size: REVIEW"
+                                                : "brings its longest side to the length wanted");
   }
   out += fmt::format(
       "position_m = [0.0, 0.0, {:.4f}]   # {:.3g} m long, {:.3g} m wide, {:.3g} m "

@@ -31,6 +31,7 @@ struct SkeletonOptions {
   std::string ground_material = "asphalt";
   std::string default_material = "painted_metal";
   double scale = 1.0;
+  bool scale_is_guessed = true;
   std::optional<SkeletonWeather> weather;  ///< none: the climate of the place
 };
 

@@ -427,32 +427,48 @@ def write_scenario(scene, folder):
     return path
 
 
+def rim(scene, face, place):
+    """Pieces of the edges and feet at which the face of the body in the plane of a place ends, as low and high ends."""
+    axis = face["axis"]
+    u, v = [a for a in range(3) if a != axis]
+    planes = [scene.planes(u), scene.planes(v)]
+    depth = np.zeros(3)
+    depth[axis] = face["sign"] * 1e-4
+
+    def in_face(i, j):
+        if not (0 <= i < len(planes[0]) - 1 and 0 <= j < len(planes[1]) - 1):
+            return False
+        p = np.array(place, float)
+        p[u] = 0.5 * (planes[0][i] + planes[0][i + 1])
+        p[v] = 0.5 * (planes[1][j] + planes[1][j + 1])
+        return bool(scene.in_body(p - depth)) and not scene.in_body(p + depth) and (p + depth)[2] > 0.0
+
+    pieces = []
+    for i in range(-1, len(planes[0])):
+        for j in range(-1, len(planes[1])):
+            for next_i, next_j in ((i + 1, j), (i, j + 1)):
+                if in_face(i, j) == in_face(next_i, next_j):
+                    continue
+                low, high = np.array(place, float), np.array(place, float)
+                low[u], high[u] = (planes[0][next_i],) * 2 if next_i > i else planes[0][i:i + 2]
+                low[v], high[v] = (planes[1][next_j],) * 2 if next_j > j else planes[1][j:j + 2]
+                pieces.append((low, high))
+    return pieces
+
+
 def distances(scene, mesh, at, faces):
     """Distances of points on faces from the nearest edge or foot of the body, m; of the road: from the body."""
     out = np.zeros(len(faces))
+    rims = {}
     for i, (p, face) in enumerate(zip(at, faces)):
         if face["road"]:
             past = [np.maximum(np.maximum(box[0] - p, p - box[1]), 0.0) for box in scene.boxes]
             out[i] = min(math.hypot(q[0], q[1]) for q in past)
             continue
-        # Faces end where the body ends or begins beside them: walk along both axes of the face.
-        best = math.inf
-        for axis in range(3):
-            if axis == face["axis"]:
-                continue
-            for plane in scene.planes(axis):
-                step = 1e-4
-                both = []
-                for side in (-1.0, 1.0):
-                    probe = p.copy()
-                    probe[axis] = plane + side * step
-                    depth = np.zeros(3)
-                    depth[face["axis"]] = face["sign"] * step
-                    both.append((bool(scene.in_body(probe - depth)), bool(scene.in_body(probe + depth))
-                                 or (probe + depth)[2] < 0.0))
-                if both[0] != both[1]:
-                    best = min(best, abs(plane - p[axis]))
-        out[i] = best
+        plane = (face["axis"], face["sign"], round(float(p[face["axis"]]), 6))
+        if plane not in rims:
+            rims[plane] = rim(scene, face, p)
+        out[i] = min(math.dist(np.clip(p, low, high), p) for low, high in rims[plane])
     return out
 
 

@@ -122,6 +122,32 @@ TEST(CliScene, centimetres_are_scaled_and_named) {
       << unscaled.out;
 }
 
+TEST(CliScene, a_stated_length_decides_the_scale) {
+  // A model that a tool has scaled to a longest side of 1.
+  const TemporaryFolder folder;
+  write_box(folder.file("car.gltf"), {.left = 0.5F, .up = 0.375F, .forward = 1.0F});
+  const ProcessResult made = run_emit(
+      {"scene", "new", folder.file("car.gltf"), "--out", folder.file("s"), "--length-m", "4.5"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_EQ(made.err.find("scale"), std::string::npos) << made.err;
+  const std::string text = read_text(folder.file("s/car.toml"));
+  EXPECT_NE(text.find("scale = 4.5 "), std::string::npos) << text;
+  const ProcessResult check = run_emit({"scene", "check", folder.file("s/car.toml")});
+  EXPECT_EQ(check.exit_code, 0) << check.out;
+  EXPECT_NE(check.out.find("4.500"), std::string::npos) << check.out;
+}
+
+TEST(CliScene, hills_are_not_taken_for_a_vehicle_in_millimetres) {
+  const TemporaryFolder folder;
+  write_box(folder.file("hills.gltf"), {.left = 4000.0F, .up = 600.0F, .forward = 5000.0F});
+  ASSERT_EQ(run_emit({"scene", "new", folder.file("hills.gltf"), "--out", folder.file("s"),
+                      "--no-ground", "--length-m", "5000"})
+                .exit_code,
+            0);
+  const ProcessResult check = run_emit({"scene", "check", folder.file("s/hills.toml")});
+  EXPECT_EQ(check.out.find("units"), std::string::npos) << check.out;
+}
+
 /// Returns what a check says of a box with a change of its scenario.
 std::string finding(const Box& box, std::vector<std::string> more) {
   const TemporaryFolder folder;

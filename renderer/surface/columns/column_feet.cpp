@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "emit/physics/constants.hpp"
+#include "surface/columns/instance_columns.hpp"
 #include "surface/rays/ray_offsets.hpp"
-#include "surface/warm_up/instance_columns.hpp"
 
 namespace emit::renderer::columns {
 namespace {
@@ -36,7 +36,7 @@ double InstanceColumns::depth_m(std::uint32_t vertex, std::span<const InstanceCo
   if (in_.places.first_hits({&ray, 1}, {true, {}}, hit) == 0U) return kDeepM;
   const InstanceColumns& body = all[hit[0].instance];
   const auto there = body.mesh_.locate(hit[0].triangle, hit[0].barycentric);
-  return closed_in(body.samples_[there.vertex[0]])
+  return body.closed_in(body.samples_[there.vertex[0]])
              ? kDeepM
              : 0.5 * static_cast<double>(hit[0].distance_m + 2.0F * offset_m);
 }

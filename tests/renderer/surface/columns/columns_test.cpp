@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Heat along the surface of bodies near their edges: the cells of columns, and what they do.
-#include "surface/warm_up/surface_columns.hpp"
+#include "surface/columns/surface_columns.hpp"
 
 #include <gtest/gtest.h>
 
@@ -69,6 +69,14 @@ scene::Mesh cubes(const std::function<bool(int, int, int)>& filled, float size_m
 }
 scene::Mesh box(float size_m) {
   return cubes([](int, int, int) { return true; }, size_m / 3.0F);
+}
+/// Slab of the given edge and thickness.
+scene::Mesh slab(float edge_m, float thickness_m) {
+  scene::Mesh mesh = cubes([](int x, int y, int z) { return x + y + z == 0; }, 1.0F);
+  const glm::vec3 size_m(edge_m, edge_m, thickness_m);
+  for (glm::vec3& position_m : mesh.positions_m) position_m *= size_m;
+  mesh.bounds = {glm::dvec3(0.0), glm::dvec3(size_m)};
+  return mesh;
 }
 /// L with arms of one cube.
 scene::Mesh ell(float size_m) {
@@ -255,6 +263,94 @@ TEST(SurfaceColumns, ConductAlikeInBothDirectionsAndNeverBackwards) {
       EXPECT_NEAR(back->second, conductance_w_k, 1e-4 * conductance_w_k);
     }
   }
+}
+
+/// Heat that flows in the columns of a body from its upper faces, held at 1 K, to its lower ones at
+/// 0 K: the steady state of their network. Nothing enters by the sides or from the base.
+struct Through {
+  double all_w = 0.0;
+  double middle_w_m2 = 0.0;  ///< in the columns of the upper face far from its edges, on average
+};
+Through heat_through(const SurfaceModel& model, const physics::ColumnCells& cells,
+                     const glm::dvec3& middle_m, double around_m) {
+  const auto& columns = model.samples.columns;
+  const std::size_t count = columns.size() * cells.count;
+  std::vector<double> kelvin(count, 0.5);
+  Through out;
+  constexpr int kSweeps = 4000;
+  for (int sweep = 0; sweep < kSweeps; ++sweep) {
+    out.all_w = 0.0;
+    double middle_w = 0.0;
+    double middle_m2 = 0.0;
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      const float up = model.samples.samples[columns[c].sample].normal.z;
+      for (std::size_t l = 0; l < cells.count; ++l) {
+        double sum_w_m2_k = 0.0;
+        double into_w_m2 = 0.0;
+        const auto link = [&](double w_m2_k, double other_k) {
+          sum_w_m2_k += w_m2_k;
+          into_w_m2 += w_m2_k * other_k;
+        };
+        const std::size_t own = c * cells.count + l;
+        if (l == 0 && std::abs(up) > 0.9F) link(cells.surface_w_m2_k(), up > 0.0F ? 1.0 : 0.0);
+        if (l > 0) link(static_cast<double>(columns[c].below_w_m2_k[l - 1]), kelvin[own - 1]);
+        if (l + 1 < cells.count) {
+          link(static_cast<double>(columns[c].below_w_m2_k[l]), kelvin[own + 1]);
+        }
+        for (std::uint32_t k = columns[c].first_link[l]; k < columns[c].first_link[l + 1]; ++k) {
+          const CellLink& beside = model.samples.links[k];
+          link(static_cast<double>(beside.conductance_w_m2_k),
+               kelvin[beside.column * cells.count + beside.cell]);
+        }
+        kelvin[own] = into_w_m2 / sum_w_m2_k;
+        if (l == 0 && up > 0.9F) {
+          const auto area_m2 = static_cast<double>(columns[c].area_m2);
+          const double heat_w = area_m2 * cells.surface_w_m2_k() * (1.0 - kelvin[own]);
+          out.all_w += heat_w;
+          const glm::dvec3 at_m(model.samples.samples[columns[c].sample].position_m);
+          if (std::max(std::abs(at_m.x - middle_m.x), std::abs(at_m.y - middle_m.y)) < around_m) {
+            middle_w += heat_w;
+            middle_m2 += area_m2;
+          }
+        }
+      }
+    }
+    out.middle_w_m2 = middle_w / middle_m2;
+  }
+  return out;
+}
+
+TEST(SurfaceColumns, OppositeFacesOfAThinSolidConductAsASlab) {
+  // The stack reaches the middle of the plate with its last cell, within a cell, or far beyond it.
+  for (const double stack_m : {0.1, 0.13, 0.3}) {
+    SCOPED_TRACE(stack_m);
+    Body body(slab(1.5F, 0.2F), concrete(stack_m), true);
+    ASSERT_NO_FATAL_FAILURE(body.warm_up());
+    const physics::ColumnCells cells =
+        physics::column_cells(std::vector<physics::StackLayer>{{stack_m, 1.28, 2300.0 * 878.0}});
+    const double slab_w = 1.28 * 1.5 * 1.5 / 0.2;
+    const Through through =
+        heat_through(body.model(), cells, body.origin_m() + glm::dvec3(0.75, 0.75, 0.0), 0.4);
+    RecordProperty("all", std::to_string(through.all_w / slab_w));
+    RecordProperty("middle", std::to_string(through.middle_w_m2 / (1.28 / 0.2)));
+    EXPECT_NEAR(through.middle_w_m2, 1.28 / 0.2, 0.01 * 1.28 / 0.2);
+    // Within half of its thickness from an edge heat goes round through columns of the sides.
+    EXPECT_NEAR(through.all_w, slab_w, 0.1 * slab_w);
+    // No column of a wide face reaches the base, which is not in the slab.
+    for (const SampleColumn& column : body.model().samples.columns) {
+      if (std::abs(body.model().samples.samples[column.sample].normal.z) < 0.9F) continue;
+      EXPECT_LT(column.below_w_m2_k[cells.count - 1], 0.01F * 1.28F / 0.1F);
+    }
+  }
+  // A stack that ends before the middle stands on its core.
+  Body thick(slab(1.5F, 0.2F), concrete(0.08), true);
+  ASSERT_NO_FATAL_FAILURE(thick.warm_up());
+  EXPECT_LT(heat_through(thick.model(),
+                         physics::column_cells(
+                             std::vector<physics::StackLayer>{{0.08, 1.28, 2300.0 * 878.0}}),
+                         thick.origin_m(), 1.0)
+                .all_w,
+            3.0);  // by the sides alone
 }
 
 /// Conductance between the body and the ground that it stands on, W/K, from either side.

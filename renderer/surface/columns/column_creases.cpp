@@ -5,9 +5,9 @@
 #include <glm/geometric.hpp>
 #include <tuple>
 
+#include "surface/columns/instance_columns.hpp"
 #include "surface/mesh/refined_mesh_edges.hpp"
 #include "surface/rays/ray_offsets.hpp"
-#include "surface/warm_up/instance_columns.hpp"
 
 namespace emit::renderer::columns {
 namespace {
@@ -217,15 +217,15 @@ void InstanceColumns::spread_creases() {
 
 void InstanceColumns::find_near() {
   if (!waiting_.empty()) spread_creases();
+  find_opposites();
   const std::size_t count = mesh_.vertices().size();
   column_of_.assign(count, kNone);
   for (std::uint32_t v = 0; v < count; ++v) {
-    const auto near = std::span(near_[v].near).first(near_[v].count);
-    if (std::ranges::any_of(near, [&](const Near& n) { return creases_[n.crease].stands; })) {
+    if (stands_near(v)) {
       standing_.push_back(v);
       continue;
     }
-    if (near.empty() && !at_foot(v)) continue;
+    if (near_[v].count == 0 && opposite_[v].slot == kNone && !at_foot(v)) continue;
     column_of_[v] = static_cast<std::uint32_t>(vertices_.size());
     vertices_.push_back(v);
   }

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <glm/geometric.hpp>
 
-#include "surface/warm_up/instance_columns.hpp"
+#include "surface/columns/instance_columns.hpp"
 
 namespace emit::renderer::columns {
 namespace {

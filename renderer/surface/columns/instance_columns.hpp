@@ -13,8 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "surface/columns/surface_columns.hpp"
 #include "surface/model/surface_model.hpp"
-#include "surface/warm_up/surface_columns.hpp"
 
 /// Columns of one instance and what finds them. Only link_columns() needs them.
 namespace emit::renderer::columns {
@@ -32,6 +32,9 @@ inline constexpr double kMaxReachM = 1.0;
 inline constexpr std::size_t kPoints = 3;
 /// Distance of a cell from the plane between two faces, in thicknesses of the cell at least.
 inline constexpr double kLeastThickness = 0.1;
+/// Share of half of a body's thickness that the stacks of both faces have to reach at least. Stacks
+/// that end just before the middle touch there.
+inline constexpr double kReachedFrac = 0.98;
 /// Distance, in ray offsets, that counts as touching: ground touches a body if it lies this close
 /// beside it, and this close to the plane of its face.
 inline constexpr float kBesideOffsets = 6.0F;
@@ -75,6 +78,11 @@ struct End {
   double distance_m = 0.0;
 };
 
+/// Face on the other side of a solid that is so thin there that both stacks reach its middle.
+struct Opposite {
+  double depth_m = 1e9;        ///< half of the solid's thickness: the material below ends there
+  std::uint32_t slot = kNone;  ///< leaf on the other face
+};
 /// Distance from a crease that goes on by `beyond_m` at both ends.
 [[nodiscard]] double distance_m(const Crease& crease, const glm::dvec3& at_m,
                                 double beyond_m = 0.0);
@@ -183,11 +191,11 @@ class InstanceColumns {
   }
   /// Returns the unit direction from an edge into a leaf.
   [[nodiscard]] glm::dvec3 inward(const Side& side) const;
-  /// Returns true for a face in a closed cavity.
-  [[nodiscard]] static bool closed_in(const SurfaceSample& sample) noexcept {
-    constexpr float kClosedFrac = 0.01F;
-    return sample.sky_frac + sample.far_frac < kClosedFrac;
-  }
+  /// Returns true for a face in a closed cavity of the body: no ray from it leaves the body's box.
+  [[nodiscard]] bool closed_in(const SurfaceSample& sample) const;
+  /// Returns the geometry that surrounds the instance at its own place. Spans of it point into the
+  /// instance.
+  [[nodiscard]] CasterSelection around() const noexcept { return {alone_.empty(), alone_}; }
   /// Returns the depth below a vertex of a wall up to which the material belongs to it: half of the
   /// way to the other face of the body, unless that one lies in a closed cavity.
   [[nodiscard]] double depth_m(std::uint32_t vertex, std::span<const InstanceColumns> all) const;
@@ -210,7 +218,11 @@ class InstanceColumns {
   void offer(std::uint32_t vertex, std::uint32_t crease);
   /// Spreads the creases over the vertices within reach, from neighbour to neighbour.
   void spread_creases();
-  /// Gives a column to the vertices near creases and feet.
+  /// Returns true near the edge of a face that stands on ground.
+  [[nodiscard]] bool stands_near(std::uint32_t vertex) const;
+  /// Finds the opposite faces of thin solids.
+  void find_opposites();
+  /// Gives a column to the vertices near creases and feet, and to those of thin solids.
   void find_near();
   /// Exchanges edges between leaves of a plane that have columns, until they are Delaunay
   /// triangles: with those no face between two columns has a negative width, however narrow the
@@ -262,6 +274,20 @@ class InstanceColumns {
   [[nodiscard]] static double share_above(double top_m, double bottom_m, double end_m) noexcept {
     return std::clamp((end_m - top_m) / (bottom_m - top_m), 0.0, 1.0);
   }
+  /// Returns the share of the material behind a concave crease that belongs to the column of its
+  /// vertex `e`, between two depths: near an end of the crease other faces take over.
+  [[nodiscard]] double share_behind(const Crease& crease, std::size_t e, double top_m,
+                                    double bottom_m) const;
+  /// Returns the last cell above a depth.
+  [[nodiscard]] static std::size_t cell_above(const ColumnCells& stack, double end_m) noexcept {
+    constexpr double kJustAbove = 1.0 - 1e-6;
+    return stack.at(kJustAbove * end_m);
+  }
+  /// Returns the conductance from the middle of a cell to that of the next one, or to the base,
+  /// W m-2 K-1, under a point where a crease ends the material at one depth and the opposite face
+  /// at another.
+  [[nodiscard]] static double below_w_m2_k(const ColumnCells& stack, std::size_t l, double crease_m,
+                                           double opposite_m) noexcept;
   /// Gives what lies open of a leaf to its open corners.
   void expose(std::uint32_t slot);
   /// Measures volumes, areas and middles of all cells.
@@ -298,12 +324,19 @@ class InstanceColumns {
   /// an area. The other half comes from the other side.
   void add_across(const Crease& crease, std::uint32_t a, std::size_t l, std::uint32_t b,
                   std::size_t m, double area_m2);
-  /// Links columns that meet in the plane that halves the angle of a crease.
+  /// Links columns that meet in the plane that halves the angle of a crease, and those of opposite
+  /// faces.
   void link_across();
+  /// Links a point of a leaf that belongs to vertex `a` with the opposite face.
+  void add_through(std::uint32_t a, std::uint32_t slot, const glm::dvec3& at_m, double area_m2);
   /// Links columns at one place on faces without a crease between them.
   void link_seams();
 
   const SurfaceInputs& in_;
+  std::vector<EntityPlacement> alone_;  ///< places an entity alone, in its body's axes
+  glm::dvec3 low_m_{1e9};               ///< box around the vertices, in the axes of the samples
+  glm::dvec3 high_m_{-1e9};
+  std::uint32_t instance_;
   std::uint32_t object_;
   const FosterHeat& heat_;
   const RefinedMesh& mesh_;
@@ -314,6 +347,7 @@ class InstanceColumns {
   std::vector<std::uint32_t> beside_;  ///< by half-edge: the leaf beyond it on the same face
   std::vector<std::pair<std::uint32_t, std::uint32_t>> seams_;
   std::vector<Neighbourhood> near_;  ///< by vertex
+  std::vector<Opposite> opposite_;   ///< by vertex
   std::vector<Foot> feet_;
   std::vector<std::uint32_t> standing_;
   std::deque<std::uint32_t> waiting_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "surface/warm_up/surface_columns.hpp"
+#include "surface/columns/surface_columns.hpp"
 
 #include <algorithm>
 #include <cstddef>
@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "emit/threads/parallel.hpp"
-#include "surface/warm_up/instance_columns.hpp"
+#include "surface/columns/instance_columns.hpp"
 
 namespace emit::renderer {
 namespace {
