@@ -78,6 +78,11 @@ class MeshStore {
     return stored;
   }
 
+  /// True where the image of a material shows nothing but the outline that it cuts out.
+  [[nodiscard]] bool is_outline(std::uint32_t material) const {
+    return cut_outs_.is_outline(material);
+  }
+
  private:
   struct Slot {
     ConvertedMesh converted;
@@ -208,11 +213,13 @@ Result<void> place_mesh(const GltfFile& file, const PlacedNode& placed, MeshStor
   return {};
 }
 
-bool has_texture(const tinygltf::Material& material) {
+/// True where images promise more than a surface gets. `outline` is true where the image of the
+/// base colour shows nothing but what it cuts out.
+bool has_texture(const tinygltf::Material& material, bool outline) {
   const auto& pbr = material.pbrMetallicRoughness;
-  for (const int index : {pbr.baseColorTexture.index, pbr.metallicRoughnessTexture.index,
-                          material.normalTexture.index, material.occlusionTexture.index,
-                          material.emissiveTexture.index}) {
+  for (const int index : {outline ? -1 : pbr.baseColorTexture.index,
+                          pbr.metallicRoughnessTexture.index, material.normalTexture.index,
+                          material.occlusionTexture.index, material.emissiveTexture.index}) {
     if (index >= 0) return true;
   }
   const auto extension = material.extensions.find("KHR_materials_pbrSpecularGlossiness");
@@ -220,7 +227,7 @@ bool has_texture(const tinygltf::Material& material) {
 }
 
 /// Says what the materials in use ask for and do not get.
-void warn_of_materials(const GltfFile& file, GltfModel& model) {
+void warn_of_materials(const GltfFile& file, const MeshStore& store, GltfModel& model) {
   std::vector<bool> in_use(model.materials.size(), false);
   for (const Mesh& mesh : model.meshes) {
     for (const Submesh& submesh : mesh.submeshes) {
@@ -229,11 +236,11 @@ void warn_of_materials(const GltfFile& file, GltfModel& model) {
   }
   std::vector<std::string> textured;
   std::vector<std::string> blended;
-  for (std::size_t i = 0; i < in_use.size(); ++i) {
+  for (std::uint32_t i = 0; i < in_use.size(); ++i) {
     if (!in_use[i]) continue;
     const tinygltf::Material& material = file.model.materials[i];
     const std::string name = "'" + model.materials[i].name + "'";
-    if (has_texture(material)) textured.push_back(name);
+    if (has_texture(material, store.is_outline(i))) textured.push_back(name);
     if (material.alphaMode == "BLEND") blended.push_back(name);
   }
   if (!textured.empty()) {
@@ -337,7 +344,7 @@ Result<GltfModel> build_model(const GltfFile& file) {
   }
   mend_facing(model);
   separate_coplanar(file, model);
-  warn_of_materials(file, model);
+  warn_of_materials(file, store, model);
   warn_of_the_rest(file, shown, model);
   return model;
 }

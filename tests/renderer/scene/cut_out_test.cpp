@@ -355,6 +355,27 @@ TEST(CutOut, surfaces_whose_image_cannot_be_read_are_solid_with_a_warning) {
   EXPECT_THAT(model.warnings, Contains(AllOf(HasSubstr("TEXCOORD_0"), HasSubstr("solid"))));
 }
 
+TEST(CutOut, image_of_one_colour_promises_nothing_but_its_outline) {
+  const Opacity leaf = disc(32, 9.0);
+  EXPECT_THAT(imported(Card{}.json(embedded(leaf))).warnings,
+              Each(Not(HasSubstr("one set of properties"))));
+  std::string rgba;
+  for (const std::uint8_t value : leaf.values) {
+    const auto green = static_cast<char>(rgba.size() < 64 ? 0x61 : 0x60);
+    rgba += std::string("\x20") + green + "\x20" + static_cast<char>(value);
+  }
+  std::string png;
+  stbi_write_png_to_func(
+      [](void* text, void* data, int size) {
+        static_cast<std::string*>(text)->append(static_cast<const char*>(data),
+                                                static_cast<std::size_t>(size));
+      },
+      &png, leaf.width_px, leaf.height_px, 4, rgba.data(), 4 * leaf.width_px);
+  const std::string coloured = R"({"uri":"data:image/png;base64,)" + test::base64(png) + R"("})";
+  EXPECT_THAT(imported(Card{}.json(coloured)).warnings,
+              Contains(AllOf(HasSubstr("'leaf'"), HasSubstr("one set of properties"))));
+}
+
 TEST(CutOut, coordinates_without_a_place_leave_the_surface_solid_with_a_warning) {
   for (const char* transform : {R"("scale":[1e300,1e300])", R"("scale":[0,0],"offset":[1e30,3])",
                                 R"("offset":[-1e200,0])"}) {

@@ -2,25 +2,12 @@
 #include "airfield.hpp"
 
 #include <cmath>
-#include <random>
 
 #include "emit/physics/constants.hpp"
+#include "random.hpp"
 
 namespace emit::scenegen {
 namespace {
-
-/// Random numbers that are the same with every library: the standard defines the engine, but not
-/// the distributions.
-class Random {
- public:
-  explicit Random(std::uint32_t seed) : engine_(seed) {}
-  double between(double lo, double hi) {
-    return lo + (hi - lo) * static_cast<double>(engine_()) / 4294967295.0;
-  }
-
- private:
-  std::mt19937 engine_;
-};
 
 void add_tree(MeshBuilder& builder, Random& random, double x, double y) {
   const double height = random.between(6.0, 14.0);
@@ -34,6 +21,26 @@ void add_tree(MeshBuilder& builder, Random& random, double x, double y) {
   builder.tube({0, 0, trunk}, {0, 0, 0.55 * height}, 0.55 * radius, radius, 7, true, false);
   builder.tube({0, 0, 0.55 * height}, {0, 0, 0.85 * height}, radius, 0.6 * radius, 7, false, false);
   builder.tube({0, 0, 0.85 * height}, {0, 0, height}, 0.6 * radius, 0.0, 7, false, false);
+  builder.origin({});
+}
+
+/// Adds a broad-leaved tree: two upright cards and a level one, which foliage cuts out.
+void add_cut_out_tree(MeshBuilder& builder, Random& random, double x, double y) {
+  const double height = random.between(9.0, 15.0);
+  const double half = height * random.between(0.3, 0.38);
+  const double bottom = 0.16 * height;
+  builder.origin({x, y, 0.0}, random.between(0.0, physics::kPi));
+  builder.material("wood").tube({0, 0, 0}, {0, 0, 0.45 * height}, 0.028 * height, 0.016 * height, 5,
+                                false, false);
+  builder.material("foliage", true);
+  builder.foliage_card({-half, 0, bottom}, {half, 0, bottom}, {half, 0, height},
+                       {-half, 0, height});
+  builder.foliage_card({0, -half, bottom}, {0, half, bottom}, {0, half, height},
+                       {0, -half, height});
+  const double middle = 0.55 * height;
+  const double level = 0.7 * half;  // a larger one would stand out of the crown as a brim
+  builder.foliage_card({-level, -level, middle}, {level, -level, middle}, {level, level, middle},
+                       {-level, level, middle});
   builder.origin({});
 }
 
@@ -71,8 +78,18 @@ void add_trees_and_fence(Scene& scene, std::uint32_t seed) {
     add_tree(trees, random, random.between(-480.0, 480.0), random.between(300.0, 480.0));
   }
   for (int i = 0; i < 60; ++i) {  // an avenue outside the southern fence
-    add_tree(trees, random, -590.0 + 20.0 * i + random.between(-3.0, 3.0),
-             -520.0 + random.between(-6.0, 6.0));
+    const double x = -590.0 + 20.0 * i + random.between(-3.0, 3.0);
+    const double y = -520.0 + random.between(-6.0, 6.0);
+    // The part that an approach from the south passes over has leaves and gaps.
+    if (std::abs(x) < 330.0) {
+      add_cut_out_tree(trees, random, x, y);
+    } else {
+      add_tree(trees, random, x, y);
+    }
+  }
+  for (int i = 0; i < 44; ++i) {  // a line of trees along the fields in the north
+    add_tree(trees, random, -620.0 + 28.0 * i + random.between(-9.0, 9.0),
+             690.0 + random.between(-7.0, 7.0));
   }
   for (int i = 0; i < 24; ++i) {  // single trees between the buildings
     add_tree(trees, random, random.between(-460.0, -330.0), random.between(20.0, 180.0));

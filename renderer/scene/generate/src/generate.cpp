@@ -147,7 +147,7 @@ Result<NamedScenes> build(const GenerateOptions& options) {
     case SceneKind::airfield: {
       scenes = vehicle_scenes();
       Scene field;
-      add_ground(field);
+      add_ground(field, options.airfield.seed);
       add_buildings(field);
       add_trees_and_fence(field, options.airfield.seed);
       scenes.emplace_back(name, std::move(field));

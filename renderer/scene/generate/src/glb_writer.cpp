@@ -13,6 +13,8 @@
 #include <string>
 #include <vector>
 
+#include "foliage_image.hpp"
+
 namespace emit::scenegen {
 namespace {
 
@@ -23,6 +25,7 @@ constexpr int kUnsignedInt = 5125;
 constexpr int kFloat = 5126;
 constexpr int kArrayBuffer = 34962;
 constexpr int kElementBuffer = 34963;
+constexpr int kClampToEdge = 33071;
 
 template <class Vector>
 Vector gltf_from(Axes axes, const Vector& v) {
@@ -53,6 +56,14 @@ class GlbBuffer {
     return add_accessor(view, kFloat, vectors.size(), "VEC3", bounds);
   }
 
+  int add_texture_coordinates(const std::vector<glm::vec2>& uv) {
+    const int view = add_view(std::as_bytes(std::span(uv)), kArrayBuffer);
+    return add_accessor(view, kFloat, uv.size(), "VEC2", "");
+  }
+
+  /// Adds the bytes of an image and returns the index of their view.
+  int add_image(std::span<const std::byte> data) { return add_view(data, 0); }
+
   int add_indices(const std::vector<std::uint32_t>& indices, std::size_t vertices) {
     if (vertices > 65535) {
       const int view = add_view(std::as_bytes(std::span(indices)), kElementBuffer);
@@ -71,8 +82,9 @@ class GlbBuffer {
 
  private:
   int add_view(std::span<const std::byte> data, int target) {
-    views_ += fmt::format(R"({}{{"buffer":0,"byteOffset":{},"byteLength":{},"target":{}}})",
-                          views_.empty() ? "" : ",", bytes_.size(), data.size(), target);
+    views_ += fmt::format(R"({}{{"buffer":0,"byteOffset":{},"byteLength":{}{}}})",
+                          views_.empty() ? "" : ",", bytes_.size(), data.size(),
+                          target == 0 ? "" : fmt::format(R"(,"target":{})", target));
     bytes_.insert(bytes_.end(), data.begin(), data.end());
     bytes_.resize((bytes_.size() + 3) / 4 * 4);
     return view_count_++;
@@ -97,11 +109,12 @@ class GlbBuffer {
 struct MaterialKey {
   std::string name;
   bool double_sided = false;
+  bool foliage = false;  ///< the image of foliage cuts it out
   bool operator==(const MaterialKey&) const = default;
 };
 
 std::size_t material_index(std::vector<MaterialKey>& materials, const Part& part) {
-  const MaterialKey key{part.material, part.double_sided};
+  const MaterialKey key{part.material, part.double_sided, !part.uv.empty()};
   const auto found = std::find(materials.begin(), materials.end(), key);
   const auto index = static_cast<std::size_t>(found - materials.begin());
   if (found == materials.end()) {
@@ -122,9 +135,12 @@ std::string meshes_json(const Scene& scene, GlbBuffer& buffer,
       const int positions = buffer.add_vectors(part.positions_m, true);
       const int normals = buffer.add_vectors(part.normals, false);
       const int indices = buffer.add_indices(part.indices, part.positions_m.size());
+      const std::string uv = part.uv.empty() ? std::string()
+                                             : fmt::format(R"(,"TEXCOORD_0":{})",
+                                                           buffer.add_texture_coordinates(part.uv));
       primitives += fmt::format(
-          R"({}{{"attributes":{{"POSITION":{},"NORMAL":{}}},"indices":{},"material":{}}})",
-          primitives.empty() ? "" : ",", positions, normals, indices,
+          R"({}{{"attributes":{{"POSITION":{},"NORMAL":{}{}}},"indices":{},"material":{}}})",
+          primitives.empty() ? "" : ",", positions, normals, uv, indices,
           material_index(materials, part));
     }
     meshes += fmt::format(R"({}{{"name":"{}","primitives":[{}]}})", meshes.empty() ? "" : ",",
@@ -166,9 +182,19 @@ physics::Result<GeneratedFile> write_glb(const std::filesystem::path& file, cons
   const std::string meshes = meshes_json(scene, buffer, materials);
   std::string material_list;
   for (const MaterialKey& material : materials) {
-    material_list +=
-        fmt::format(R"({}{{"name":"{}"{}}})", material_list.empty() ? "" : ",", material.name,
-                    material.double_sided ? R"(,"doubleSided":true)" : "");
+    material_list += fmt::format(
+        R"({}{{"name":"{}"{}{}}})", material_list.empty() ? "" : ",", material.name,
+        material.double_sided ? R"(,"doubleSided":true)" : "",
+        material.foliage
+            ? R"(,"alphaMode":"MASK","pbrMetallicRoughness":{"baseColorTexture":{"index":0}})"
+            : "");
+  }
+  std::string images;
+  if (std::ranges::any_of(materials, &MaterialKey::foliage)) {
+    images = fmt::format(
+        R"("textures":[{{"source":0,"sampler":0}}],"samplers":[{{"wrapS":{0},"wrapT":{0}}}],)"
+        R"("images":[{{"bufferView":{1},"mimeType":"image/png"}}],)",
+        kClampToEdge, buffer.add_image(foliage_png()));
   }
   std::string node_list;
   for (std::size_t i = 0; i < scene.nodes.size(); ++i) {
@@ -176,9 +202,9 @@ physics::Result<GeneratedFile> write_glb(const std::filesystem::path& file, cons
   }
   std::string json =
       fmt::format(R"({{"asset":{{"version":"2.0","generator":"emit generate"}},"scene":0,)"
-                  R"("scenes":[{{"nodes":[{}]}}],"nodes":[{}],"meshes":[{}],"materials":[{}],)"
+                  R"("scenes":[{{"nodes":[{}]}}],"nodes":[{}],"meshes":[{}],"materials":[{}],{})"
                   R"("accessors":[{}],"bufferViews":[{}],"buffers":[{{"byteLength":{}}}]}})",
-                  node_list, nodes_json(scene), meshes, material_list, buffer.accessors(),
+                  node_list, nodes_json(scene), meshes, material_list, images, buffer.accessors(),
                   buffer.views(), buffer.bytes().size());
   json.resize((json.size() + 3) / 4 * 4, ' ');
 

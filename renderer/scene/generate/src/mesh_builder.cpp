@@ -27,7 +27,7 @@ MeshBuilder& MeshBuilder::material(const std::string& name, bool double_sided) {
   });
   current_ = static_cast<std::size_t>(found - mesh_.parts.begin());
   if (found == mesh_.parts.end()) {
-    mesh_.parts.push_back({name, double_sided, {}, {}, {}});
+    mesh_.parts.push_back({name, double_sided, {}, {}, {}, {}});
   }
   return *this;
 }
@@ -76,6 +76,16 @@ void MeshBuilder::polygon(const std::vector<glm::dvec3>& corners) {
 void MeshBuilder::quad(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c,
                        const glm::dvec3& d) {
   polygon({a, b, c, d});
+}
+
+void MeshBuilder::foliage_card(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c,
+                               const glm::dvec3& d) {
+  EMIT_CHECK(part().double_sided);
+  EMIT_CHECK_OP(part().uv.size(), ==, part().positions_m.size());
+  quad(a, b, c, d);
+  for (const glm::vec2 corner : {glm::vec2(0.0F, 1.0F), {1.0F, 1.0F}, {1.0F, 0.0F}, {0.0F, 0.0F}}) {
+    part().uv.push_back(corner);
+  }
 }
 
 void MeshBuilder::grid_quad(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c,

@@ -4,6 +4,7 @@
 #include <glm/ext/matrix_double4x4.hpp>
 #include <glm/ext/vector_double2.hpp>
 #include <glm/ext/vector_double3.hpp>
+#include <glm/ext/vector_float2.hpp>
 #include <glm/ext/vector_float3.hpp>
 #include <string>
 #include <vector>
@@ -17,6 +18,8 @@ struct Part {
   bool double_sided = false;
   std::vector<glm::vec3> positions_m;
   std::vector<glm::vec3> normals;
+  /// Texture coordinates, where the outline of foliage cuts out the part; else empty.
+  std::vector<glm::vec2> uv;
   std::vector<std::uint32_t> indices;
 };
 
@@ -67,6 +70,11 @@ class MeshBuilder {
   /// Adds a quad that is cut into `columns` x `rows` equal cells.
   void grid_quad(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, const glm::dvec3& d,
                  std::uint32_t columns, std::uint32_t rows);
+
+  /// Adds a card that foliage cuts out of a quad: the image stands upright from a, b to d, c. It
+  /// needs a material of its own, in which it is double-sided.
+  void foliage_card(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c,
+                    const glm::dvec3& d);
 
   enum Faces : std::uint32_t { kTop = 1, kBottom = 2, kSides = 4, kAll = 7 };
   /// Adds a box with edges along the axes.

@@ -449,7 +449,7 @@ Result<GeneratedFile> write_terrain(const std::filesystem::path& file, const Ter
     for (const TerrainPart& part : tile.parts) {
       EMIT_CHECK_OP(part.material, <, material_names.size());
       mesh.parts.push_back(
-          {material_names[part.material], false, part.positions_m, part.normals, part.indices});
+          {material_names[part.material], false, part.positions_m, part.normals, {}, part.indices});
     }
     const std::string name = mesh.name;
     scene.place(scene.add_mesh(std::move(mesh)), name, tile.origin_world_m);

@@ -54,6 +54,8 @@ Result<void> take_alpha(const tinygltf::Image& image, double factor, AlphaMask& 
   mask.width_px = image.width;
   mask.height_px = image.height;
   mask.alpha.resize(pixels);
+  mask.one_colour = true;
+  const std::size_t colour_bytes = 3 * bytes_per_value;
   for (std::size_t i = 0; i < pixels; ++i) {
     double value = image.image[4 * i + 3] / 255.0;
     if (bytes_per_value == 2) {
@@ -62,6 +64,9 @@ Result<void> take_alpha(const tinygltf::Image& image, double factor, AlphaMask& 
       value = word / 65535.0;
     }
     mask.alpha[i] = static_cast<float>(value * factor);
+    mask.one_colour = mask.one_colour &&
+                      std::memcmp(image.image.data(), image.image.data() + 4 * bytes_per_value * i,
+                                  colour_bytes) == 0;
   }
   return {};
 }

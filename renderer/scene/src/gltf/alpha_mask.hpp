@@ -24,6 +24,7 @@ struct AlphaMask {
   Wrap wrap_v = Wrap::repeat;
   int tex_coord = 0;              ///< N of the attribute TEXCOORD_N
   glm::dmat3 image_from_uv{1.0};  ///< KHR_texture_transform
+  bool one_colour = false;        ///< the image has one colour: it shows nothing but the outline
   [[nodiscard]] float at(int x, int y) const {
     return alpha[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_px) +
                  static_cast<std::size_t>(x)];

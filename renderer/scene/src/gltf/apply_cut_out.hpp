@@ -20,6 +20,11 @@ class CutOuts {
   /// Returns the mask that cuts out the surfaces of a material; null where there is none. An image
   /// that cannot be read leaves the surfaces solid, which `warnings` says once.
   [[nodiscard]] CutOut* find(std::uint32_t material, std::vector<std::string>& warnings);
+  /// True where a mask has been read for a material, and its image shows nothing but the outline.
+  [[nodiscard]] bool is_outline(std::uint32_t material) const {
+    const auto found = cut_outs_.find(material);
+    return found != cut_outs_.end() && found->second && found->second->mask().one_colour;
+  }
 
  private:
   const GltfFile& file_;

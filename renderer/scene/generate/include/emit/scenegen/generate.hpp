@@ -61,7 +61,7 @@ struct RibbedOptions {
 
 /// Airfield of about a square kilometre. The plan is in airfield.hpp.
 struct AirfieldOptions {
-  std::uint32_t seed = 1;  ///< seed of the places of trees, cars and small things
+  std::uint32_t seed = 1;  ///< seed of trees, slabs, repairs and tyre marks
 };
 
 /// Options of generate(). Only those of `kind` are used.
