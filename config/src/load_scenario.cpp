@@ -286,6 +286,33 @@ void check_parts_vary_not(const Node& root, const ScenarioDesc& scenario,
   }
 }
 
+/// Clouds are drawn in the sky alone: a camera above them would see the ground through them.
+void warn_of_camera_above_clouds(ScenarioDesc& scenario) {
+  if (!scenario.clouds) return;
+  const bool above =
+      std::ranges::any_of(scenario.sensor.trajectory, [&scenario](const scene::Keyframe& key) {
+        return key.pose.position_world_m.z >= scenario.clouds->base_m;
+      });
+  if (!above) return;
+  scenario.warnings.push_back(
+      fmt::format("{}: the sensor rises above the clouds ({} m), which hide nothing below it",
+                  scenario.file.string(), toml_number(scenario.clouds->base_m)));
+}
+
+/// Temperatures are linear within a live step: an edge of shade that moves far in one is smeared.
+void warn_of_clouds_that_outrun_steps(ScenarioDesc& scenario) {
+  if (!scenario.clouds) return;
+  const double moved_m = scenario.clouds->drift_m_s * scenario.thermal.first_step_s;
+  if (moved_m <= 0.5 * scenario.clouds->shortest_m) return;
+  scenario.warnings.push_back(
+      fmt::format("{}: the clouds move {:.0f} m in a step of heat (thermal.first_step_s = {} s), "
+                  "more than half "
+                  "of clouds.shortest_m ({} m), which smears their shade in time; take {:.2g} s",
+                  scenario.file.string(), moved_m, toml_number(scenario.thermal.first_step_s),
+                  toml_number(scenario.clouds->shortest_m),
+                  0.5 * scenario.clouds->shortest_m / scenario.clouds->drift_m_s));
+}
+
 /// Smoke drifts with the wind, whose direction has to be known.
 void warn_of_smoke_without_wind(ScenarioDesc& scenario) {
   if (scenario.gas.smokes.empty()) return;
@@ -388,6 +415,7 @@ Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
   read_table(thermal, thermal_keys(), scenario.thermal, diagnostics);
   complete_history(thermal, scenario.thermal);
   resolve_weather(root, scenario, diagnostics);
+  resolve_clouds(root, scenario, diagnostics);
   if (!thermal.has("initial_k")) scenario.thermal.initial_k = scene::mean_air_k(scenario);
   resolve_display(root, scenario, diagnostics);
 
@@ -415,6 +443,8 @@ Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
   resolve_default_material(root, head, scenario, diagnostics);
   check_surroundings(thermal, scenario, diagnostics);
   scenario.sensor = resolve_sensor(root, diagnostics);
+  warn_of_camera_above_clouds(scenario);
+  warn_of_clouds_that_outrun_steps(scenario);
   scenario.objects =
       resolve_objects(root, scenario.materials, options.require_scene_files, diagnostics);
   check_parts_vary_not(root, scenario, diagnostics);

@@ -30,6 +30,7 @@ Environment::Environment(const scene::ScenarioDesc& scenario)
       table_(scenario.weather),
       usual_dew_point_k_(scene::usual_dew_point_k(scenario)),
       film_factor_(scenario.thermal.film_factor),
+      clouds_(scenario.clouds ? physics::CloudField::shared(*scenario.clouds) : nullptr),
       table_rain_(scenario.weather) {
   live_rain_mm_.reserve(kMaxLiveSamples);
   live_.reserve(kMaxLiveSamples);

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "emit/physics/climate/rain.hpp"
+#include "emit/physics/sky/cloud_field.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/physics/weather.hpp"
 #include "emit/scene/scene_desc.hpp"
@@ -55,6 +57,16 @@ class Environment {
   [[nodiscard]] physics::Forcing forcing_at(std::int64_t sim_time_ns,
                                             const physics::SunPosition& sun) const noexcept;
 
+  /// Returns the broken clouds over the scene; null without any. They live as long as the
+  /// environment.
+  [[nodiscard]] const physics::CloudField* clouds() const noexcept { return clouds_.get(); }
+  /// Returns the direct sun under these clouds, for results of forcing_at() and sun_at() for the
+  /// same instant. @pre clouds() != nullptr
+  [[nodiscard]] physics::CloudLight cloud_light(const physics::Forcing& forcing,
+                                                const physics::SunPosition& sun) const noexcept {
+    return clouds_->light(forcing, sun, place_, clear_sky_.linke_turbidity);
+  }
+
  private:
   [[nodiscard]] double rain_until_mm(std::int64_t sim_time_ns) const noexcept;
 
@@ -64,6 +76,7 @@ class Environment {
   std::vector<physics::WeatherSample> table_;
   double usual_dew_point_k_ = 0.0;  ///< where the weather states no humidity
   double film_factor_ = 1.0;
+  std::shared_ptr<const physics::CloudField> clouds_;  ///< copies of the environment share it
   std::vector<physics::WeatherSample> live_;
   std::vector<std::int64_t> changes_ns_;  ///< times of the rows of live_
   physics::RainDepth table_rain_;

@@ -22,6 +22,7 @@ struct RadianceContent {
   std::uint32_t outputs = 0;        ///< planes behind those of the bands, EMIT_OUTPUT_*
   bool clutter = false;             ///< some materials vary from place to place
   bool clutter_emissivity = false;  ///< the emissivity of some does
+  bool clouds = false;              ///< there are broken clouds
 };
 
 /// Radiance of every pixel in all bands (part 5 of the paper). See passes/radiance.comp.

@@ -36,6 +36,7 @@
 #include "passes/target_pass.hpp"
 #include "stages/band_model.hpp"
 #include "stages/cached_stage.hpp"
+#include "stages/cloud_layer.hpp"
 #include "stages/clutter_fields.hpp"
 #include "stages/frame_setup.hpp"
 #include "stages/gas_model.hpp"
@@ -59,7 +60,7 @@ static_assert(EMIT_MAX_ATMOSPHERE_TERMS == limits::kMaxAtmosphereTerms);
 constexpr std::size_t kBlockAlignment = 256;
 /// Largest number of planes: radiance of all bands, temperature, depth, object, sun, sky, what
 /// arrives in all bands, material, coverage.
-constexpr std::size_t kMaxPlanes = 2 * EMIT_MAX_BANDS + 14;
+constexpr std::size_t kMaxPlanes = 2 * EMIT_MAX_BANDS + 15;
 
 /// Checks the limits of the renderer. Errors: config, naming the value and the limit.
 Result<void> check_limits(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
@@ -227,6 +228,7 @@ class GlRenderer final : public Renderer {
   BandModel bands_;
   std::optional<GasModel> gas_;
   ClutterFields clutter_;
+  std::optional<CloudLayer> cloud_layer_;  ///< empty without broken clouds
   FramePasses passes_;
   std::unique_ptr<ThermalStage> stage_;
   bool warm_ = false;  ///< the stage has been warmed up
@@ -253,7 +255,7 @@ class GlRenderer final : public Renderer {
 };
 
 /// Content that the radiance pass is compiled for.
-RadianceContent radiance_content(const BandModel& bands, const ClutterFields& clutter,
+RadianceContent radiance_content(const BandModel& bands, const ClutterFields& clutter, bool clouds,
                                  const OutputOptions& output) {
   return {.bands = static_cast<std::uint32_t>(bands.params().size()),
           .air_terms = bands.air_terms(),
@@ -268,7 +270,8 @@ RadianceContent radiance_content(const BandModel& bands, const ClutterFields& cl
                      (output.sun ? EMIT_OUTPUT_SUN : 0U) | (output.sky ? EMIT_OUTPUT_SKY : 0U) |
                      (output.terms ? EMIT_OUTPUT_TERMS : 0U),
           .clutter = !clutter.empty(),
-          .clutter_emissivity = clutter.change_emissivity()};
+          .clutter_emissivity = clutter.change_emissivity(),
+          .clouds = clouds};
 }
 
 /// True when some object of the scenario is an entity.
@@ -281,7 +284,7 @@ bool has_entities(const scene::ScenarioDesc& scenario) {
 std::size_t surface_planes(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
   return scenario.bands.size() + (output.temperature ? 1U : 0U) + (output.depth ? 1U : 0U) +
          (output.object ? 1U : 0U) + (output.sun ? 1U : 0U) + (output.sky ? 1U : 0U) +
-         (output.terms ? scenario.bands.size() + 8 : 0U);
+         (output.terms ? scenario.bands.size() + 9 : 0U);
 }
 
 /// Number of planes of the output image.
@@ -346,6 +349,9 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
                                    entity_film_body(scenario_, geometry, i));
   }
   history_.parts = make_part_histories(scenario_, geometry, scene_stats_.warnings);
+  if (const physics::CloudField* clouds = history_.environment.clouds()) {
+    cloud_layer_.emplace(*clouds);
+  }
   const std::size_t plane_px = std::size_t{scenario_.sensor.width_px} * scenario_.sensor.height_px;
   // Set the parameters that all frames share.
   frame_params_.output_px = glm::uvec2(scenario_.sensor.width_px, scenario_.sensor.height_px);
@@ -385,6 +391,7 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
       view.clutter_variance_k2 = next_plane();
       for (std::span<const float>& plane_of_axis : view.normal) plane_of_axis = next_plane();
       view.glint_per_sr = next_plane();
+      view.clouds = next_plane();
     }
     if (output_.coverage) view.coverage_frac = next_plane();
   }
@@ -523,7 +530,13 @@ void GlRenderer::prepare(const FrameRequest& request, const QualityLevel& level)
       {physics::Radians(scenario_.place.lat_rad), physics::Radians(scenario_.place.lon_rad),
        physics::Metres(scenario_.place.height_m)});
   set_sky_bodies(sun, moon, frame_params_);
-  bands_.update(stage_->forcing_now(), sun, moon, sensor_m);
+  physics::CloudLight cloud_light;
+  if (cloud_layer_) {
+    cloud_light = history_.environment.cloud_light(stage_->forcing_now(), sun);
+    cloud_layer_->update(*history_.environment.clouds(), cloud_light, sun,
+                         request.sensor_pose.position_world_m, request.thermal_time_ns);
+  }
+  bands_.update(stage_->forcing_now(), sun, moon, sensor_m, cloud_light);
   if (passes_.targets) passes_.targets->prepare(targets, camera.view, frame_params_);
   if (gas_) prepare_gas(request);
   upload_frame();
@@ -572,6 +585,7 @@ std::vector<RadianceTerms> GlRenderer::radiance_terms(const FrameView& view, con
   seen.glint_per_sr = view.glint_per_sr[i];
   seen.clutter_sd = view.clutter_sd[i];
   seen.clutter_variance_k2 = view.clutter_variance_k2[i];
+  if (!seen.surface) seen.cloud_frac = view.clouds[i];
   std::vector<RadianceTerms> out;
   for (std::size_t b = 0; b < bands_.bands(); ++b) {
     out.push_back(bands_.terms(b, seen, view.incoming_w_m2_sr[b][i]));
@@ -599,6 +613,7 @@ void GlRenderer::upload_frame() noexcept {
   frame_buffer_.upload(std::span<const gpu::FrameParams>(&frame_params_, 1));
   band_buffer_.upload(bands_.params());
   if (bands_.air_nodes_change()) air_buffer_.upload(bands_.air_nodes_now());
+  if (cloud_layer_) cloud_layer_->upload();
   if (passes_.targets) passes_.targets->upload();
   if (passes_.gas) passes_.gas->upload();
   stage_->upload();
@@ -613,6 +628,7 @@ void GlRenderer::bind_frame() const noexcept {
   output_buffer_.bind_storage(EMIT_BIND_STATS, stats_offset_, sizeof(gpu::FrameStatsGpu));
   passes_.geometry.bind_textures();
   if (!clutter_.empty()) clutter_.bind();
+  if (cloud_layer_) cloud_layer_->bind();
   stage_->bind();
 }
 
@@ -838,7 +854,8 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
   auto geometry_pass = GeometryPass::create(*context, geometry_setup);
   if (!geometry_pass) return tl::unexpected(std::move(geometry_pass.error()));
   auto radiance_pass = RadiancePass::create(
-      scenario.thermal, radiance_content(*bands, *clutter, output), context->software());
+      scenario.thermal, radiance_content(*bands, *clutter, scenario.clouds.has_value(), output),
+      context->software());
   if (!radiance_pass) return tl::unexpected(std::move(radiance_pass.error()));
   FramePasses passes{std::move(*geometry_pass), std::move(*radiance_pass), {}, {}, {}};
   std::optional<GasModel> gas;

@@ -196,6 +196,7 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
   model.place_m_ = scenario.place.height_m;
   model.turbidity_ = scenario.clear_sky.linke_turbidity;
   model.cloud_base_ = scenario.clear_sky.cloud_base;
+  model.clouds_ = scenario.clouds;
   // The sky keeps to one dew point over the whole run: the humidity of a weather table does not
   // count.
   model.dew_point_k_ = scene::usual_dew_point_k(scenario);
@@ -262,8 +263,10 @@ std::vector<physics::ApparentTemperature> BandModel::apparent_temperatures() con
 BandModel::Instant BandModel::instant_of(const physics::Forcing& forcing,
                                          const physics::SunPosition& sun) const noexcept {
   Instant now;
-  now.sky = physics::sky_state(forcing.longwave_down_w_m2, forcing.air_k, dew_point_k_,
-                               forcing.cloud_frac, cloud_base_);
+  now.sky = clouds_ ? physics::sky_of_cover(forcing.longwave_down_w_m2, forcing.air_k, dew_point_k_,
+                                            clouds_->cover_frac, clouds_->base_m)
+                    : physics::sky_state(forcing.longwave_down_w_m2, forcing.air_k, dew_point_k_,
+                                         forcing.cloud_frac, cloud_base_);
   now.air_k = forcing.air_k;
   now.cloud_frac = forcing.cloud_frac;
   now.environment_k = forcing.environment_k;
@@ -333,6 +336,7 @@ void BandModel::light_at(const physics::Forcing& forcing, const physics::SunPosi
 
 double BandModel::shown_beam_frac(const Instant& now, double sensor_m) const noexcept {
   if (sensor_m < place_m_ + now.sky.cloud_base_m) return now.beam_frac;
+  if (clouds_) return now.beam_frac * cloud_light_.gain;
   return now.cloud_frac < 1.0 && now.beam_frac > 0.0 ? now.beam_frac / (1.0 - now.cloud_frac) : 1.0;
 }
 
@@ -347,7 +351,7 @@ void BandModel::update_scattered(const Entry& entry, const Instant& now, double 
   entry.view->sun_at(sensor_m,
                      {.sin_elevation = now.sin_shown,
                       .share_frac = beam_frac / (now.distance_au * now.distance_au),
-                      .cloud_cover_frac = now.sky.cloud_cover_frac,
+                      .cloud_cover_frac = even_cover_frac(entry, now),
                       .cloud_base_m = place_m_ + now.sky.cloud_base_m},
                      std::span(air_nodes_).subspan(sun_nodes_[band], physics::AirView::kSunNodes));
 }
@@ -370,7 +374,7 @@ void BandModel::update_bodies(const Entry& entry, const Instant& now,
                     physics::relative_air_mass(physics::Radians(std::asin(towards.z))));
   };
   const bool above_clouds = sensor_m >= place_m_ + now.sky.cloud_base_m;
-  const double cover_frac = entry.has_sky && !above_clouds ? now.sky.cloud_cover_frac : 0.0;
+  const double cover_frac = above_clouds ? 0.0 : even_cover_frac(entry, now);
   const double beam_frac = shown_beam_frac(now, sensor_m);
   const double sine = std::sin(physics::kSunSemiAngleRad);
   params.sun_disc_w_m2_sr =
@@ -383,8 +387,10 @@ void BandModel::update_bodies(const Entry& entry, const Instant& now,
 }
 
 void BandModel::update(const physics::Forcing& forcing, const physics::SunPosition& sun,
-                       const physics::MoonPosition& moon, double sensor_m) noexcept {
+                       const physics::MoonPosition& moon, double sensor_m,
+                       const physics::CloudLight& cloud_light) noexcept {
   const Instant now = instant_of(forcing, sun);
+  cloud_light_ = cloud_light;
   sunlit_ = false;
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     const Entry& entry = entries_[i];
@@ -400,8 +406,9 @@ void BandModel::update(const physics::Forcing& forcing, const physics::SunPositi
     const auto black = [&](double kelvin) {
       return physics::band_radiance(entry.band, physics::Kelvin(kelvin)).radiance_w_m2_sr;
     };
-    const double cover_frac = entry.has_sky ? now.sky.cloud_cover_frac : 0.0;
+    const double cover_frac = even_cover_frac(entry, now);
     const double cloud_w_m2_sr = black(now.sky.cloud_k);
+    params.cloud_base_w_m2_sr = static_cast<float>(entry.has_sky ? cloud_w_m2_sr : 0.0);
     params.air_radiance_w_m2_sr = static_cast<float>(black(now.air_k));
     params.sky_air_radiance_w_m2_sr =
         static_cast<float>((1.0 - cover_frac) * black(now.air_k + now.sky.warmer_k));
@@ -413,12 +420,52 @@ void BandModel::update(const physics::Forcing& forcing, const physics::SunPositi
     entry.view->at(sensor_m,
                    {.warmer_k = warmer_k(entry, now),
                     .sky_warmer_k = sky_warmer_k(entry, now),
-                    .cloud_cover_frac = now.sky.cloud_cover_frac,
+                    .cloud_cover_frac = cover_frac,
                     .cloud_base_m = place_m_ + now.sky.cloud_base_m,
                     .cloud_radiance_w_m2_sr = cloud_w_m2_sr},
                    std::span(air_nodes_).subspan(params.air_view_first, physics::AirView::kNodes));
+    if (clouds_) {
+      params.cloud_base_w_m2_sr = static_cast<float>(cloud_base_w_m2_sr(i, now, sensor_m));
+    }
     update_scattered(entry, now, sensor_m, i);
   }
+}
+
+double BandModel::cloud_base_w_m2_sr(std::size_t band, const Instant& now,
+                                     double sensor_m) const noexcept {
+  const auto black = [&](double kelvin) {
+    return physics::band_radiance(entries_[band].band, physics::Kelvin(kelvin)).radiance_w_m2_sr;
+  };
+  const double base_m = place_m_ + now.sky.cloud_base_m;
+  if (sensor_m >= base_m) return 0.0;
+  // Average the air before the clouds over the sky of level ground.
+  constexpr int kRings = 16;
+  double through = 0.0;
+  double path = 0.0;
+  for (int i = 0; i < kRings; ++i) {
+    const double sine = (i + 0.5) / kRings;
+    const double weight = 2.0 * sine / kRings;
+    const auto range_m = static_cast<float>(physics::cloud_range_m(base_m - sensor_m, sine));
+    const physics::AirSight sight =
+        physics::air_sight(air_nodes_of(band), static_cast<float>(base_m), range_m);
+    through += weight * static_cast<double>(sight.transmittance_frac[0]);
+    path += weight * static_cast<double>(sight.path_radiance_w_m2_sr);
+  }
+  // Clouds hardly show in air that lets hardly anything through, so that any warmth will do there.
+  constexpr double kColdestK = 200.0;
+  const double warmest_k = std::max(now.air_k, now.sky.cloud_k);
+  return std::clamp((black(now.sky.cloud_k) - path) / std::max(through, 1e-6), black(kColdestK),
+                    black(warmest_k));
+}
+
+double BandModel::cloud_w_m2_sr(std::size_t band, const Seen& seen) const noexcept {
+  const double base_w_m2_sr = params_[band].cloud_base_w_m2_sr;
+  if (!entries_[band].view) return base_w_m2_sr;
+  const auto base_m = static_cast<float>(place_m_ + clouds_->base_m);
+  const auto range_m = static_cast<float>(physics::cloud_range_m(
+      std::max(base_m - seen.sensor_height_m, 1.0F), static_cast<double>(seen.sin_elevation)));
+  const physics::AirSight sight = physics::air_sight(air_nodes_of(band), base_m, range_m);
+  return sight.transmittance_frac[0] * base_w_m2_sr + sight.path_radiance_w_m2_sr;
 }
 
 void BandModel::update_lobe_sky(std::size_t band, const Instant& now) noexcept {
@@ -536,6 +583,15 @@ RadianceTerms BandModel::terms(std::size_t band, const Seen& seen,
                              (1.0 - std::pow(entry.vertical_transmittance_frac, mass)) +
                          clouds;
     }
+    // Put clouds before the sky, and before sun and moon.
+    const double clear_frac = 1.0 - static_cast<double>(seen.cloud_frac);
+    if (clouds_) {
+      out.path_w_m2_sr =
+          clear_frac * out.path_w_m2_sr + seen.cloud_frac * cloud_w_m2_sr(band, seen);
+      out.scattered_w_m2_sr *= clear_frac;
+      const bool above = seen.sensor_height_m >= place_m_ + clouds_->base_m;
+      if (!above) sun_through_frac *= cloud_light_.by_mean(seen.cloud_frac);
+    }
     out.bodies_w_m2_sr = seen.bodies.sun_frac * sun_through_frac * params.sun_disc_w_m2_sr;
     if (seen.bodies.moon_frac > 0.0F) {
       double sum = 0.0;
@@ -546,7 +602,7 @@ RadianceTerms BandModel::terms(std::size_t band, const Seen& seen,
                 seen.bodies.moon_cosine[p] * params.moon_reflected_w_m2_sr);
         weights += seen.bodies.moon_weight[p];
       }
-      out.bodies_w_m2_sr += seen.bodies.moon_frac * moon_through_frac * sum / weights;
+      out.bodies_w_m2_sr += clear_frac * seen.bodies.moon_frac * moon_through_frac * sum / weights;
     }
     return out;
   }

@@ -33,9 +33,10 @@ class BandModel final : public BandLights {
                                                         std::span<const scene::Material> materials);
 
   /// Sets air, surroundings and sun to the instant of the frame. `sensor_m` is the height of the
-  /// camera above sea level.
+  /// camera above sea level; `cloud_light` is that of broken clouds, if there are any.
   void update(const physics::Forcing& forcing, const physics::SunPosition& sun,
-              const physics::MoonPosition& moon, double sensor_m) noexcept;
+              const physics::MoonPosition& moon, double sensor_m,
+              const physics::CloudLight& cloud_light) noexcept;
 
   [[nodiscard]] std::size_t bands() const noexcept override { return entries_.size(); }
   void light_at(const physics::Forcing& forcing, const physics::SunPosition& sun,
@@ -86,6 +87,7 @@ class BandModel final : public BandLights {
     float glint_per_sr = 0.0F;
     float clutter_sd = 0.0F;           ///< mean of the clutter's field over the pixel
     float clutter_variance_k2 = 0.0F;  ///< of the temperature within the pixel
+    float cloud_frac = 0.0F;           ///< opacity of broken clouds in a pixel of the sky
   };
   /// Splits the radiance of a pixel of the instant of update(). `incoming_w_m2_sr` is what arrives
   /// at the surface from everything but the sun. Twin of radiance.comp, in float32 like that.
@@ -176,6 +178,17 @@ class BandModel final : public BandLights {
   /// Sets the sunlight that the air of a band scatters towards the camera.
   void update_scattered(const Entry& entry, const Instant& now, double sensor_m,
                         std::size_t band) noexcept;
+  /// Returns the cover that the picture shows as even: that of clouds with structure is left to the
+  /// pixels.
+  [[nodiscard]] double even_cover_frac(const Entry& entry, const Instant& now) const noexcept {
+    return entry.has_sky && !clouds_ ? now.sky.cloud_cover_frac : 0.0;
+  }
+  /// Returns the radiance of the base of broken clouds in a band for a camera at a height: that of
+  /// clouds whose mean over the sky, with the air before them, is that of now.sky.
+  [[nodiscard]] double cloud_base_w_m2_sr(std::size_t band, const Instant& now,
+                                          double sensor_m) const noexcept;
+  /// Returns the radiance of a cloud in a pixel of the sky, with the air before it.
+  [[nodiscard]] double cloud_w_m2_sr(std::size_t band, const Seen& seen) const noexcept;
   /// Sets the radiance of the discs of sun and moon in a band.
   void update_bodies(const Entry& entry, const Instant& now, const physics::MoonPosition& moon,
                      double sensor_m, gpu::BandParams& params) const noexcept;
@@ -194,6 +207,8 @@ class BandModel final : public BandLights {
   double turbidity_ = 0.0;
   double dew_point_k_ = 0.0;
   physics::CloudBase cloud_base_;
+  std::optional<physics::Clouds> clouds_;
+  physics::CloudLight cloud_light_;  ///< of the latest update()
   std::uint32_t air_model_ = 0;
   std::uint32_t air_sun_ = 0;
   std::uint32_t air_terms_ = 0;

@@ -690,6 +690,63 @@ TEST_F(ConfigTest, clutter_is_read_checked_and_printed) {
   }
 }
 
+TEST_F(ConfigTest, clouds_are_read_checked_and_printed) {
+  const auto loaded = scenario(
+      "[weather]\nwind_m_s = 4\nwind_from_deg = 270\n[clouds]\ncover_frac = 0.3\nbase_m = 1280\n"
+      "seed = 9\n");
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
+  ASSERT_TRUE(loaded->clouds.has_value());
+  // The wind grows with the seventh root of the height: twice that of 10 m.
+  EXPECT_NEAR(loaded->clouds->drift_m_s, 8.0, 1e-12);
+  EXPECT_NEAR(loaded->clouds->velocity_m_s().x, 8.0, 1e-12);
+  EXPECT_EQ(loaded->clouds->seed, 9U);
+  EXPECT_EQ(loaded->clear_sky.cloud_frac, 0.3);
+  EXPECT_EQ(loaded->clear_sky.cloud_transmission_frac, 0.1);
+  EXPECT_EQ(loaded->clear_sky.cloud_base.height_m, 1280.0);
+  const auto again = load_scenario(write("p.toml", print_scenario(*loaded)), {}, options_);
+  ASSERT_TRUE(again.has_value()) << again.error().text;
+  EXPECT_EQ(again->clouds, loaded->clouds);
+  EXPECT_EQ(print_scenario(*again), print_scenario(*loaded));
+  EXPECT_THAT(loaded->warnings,
+              ::testing::Not(::testing::Contains(::testing::HasSubstr("above the clouds"))));
+  const std::string head = "[clouds]\ncover_frac = 0.3\n";
+  const std::string drift = "drift_m_s = 5\ndrift_from_deg = 90\n";
+  const std::vector<std::pair<std::string, std::string>> faults{
+      {"[clouds]\n" + drift, "key 'cover_frac' is missing"},
+      {head, "'drift_from_deg' is missing"},
+      {head + drift + "longest_m = 100\n",
+       "'longest_m' (100.0) must be above 'shortest_m' (200.0), and at most 32.0 times it"},
+      {head + drift + "[weather]\ncloud_frac = 0.2\n",
+       "'cloud_frac' has no place beside [clouds], whose 'cover_frac' says it"},
+      {head + drift + "[weather]\ncloud_base_m = 900\n",
+       "'cloud_base_m' has no place beside [clouds], whose 'base_m' says it"},
+      {head + drift + "[thermal]\nmethod = \"per-frame\"\n",
+       "[clouds] needs thermal.method = \"cached\""},
+      {head + drift + "[thermal]\nmodel = \"emit2014\"\n", "thermal.model = \"foster\""},
+  };
+  for (const auto& [text, message] : faults) {
+    EXPECT_THAT(scenario_error(text), ::testing::HasSubstr(message)) << text;
+  }
+  const auto high = scenario(head + drift + "[sensor]\nposition_m = [0, 0, 2000]\n");
+  ASSERT_TRUE(high.has_value()) << high.error().text;
+  EXPECT_THAT(
+      high->warnings,
+      ::testing::Contains(::testing::HasSubstr("the sensor rises above the clouds (1500.0 m)")));
+  // A step of heat in which clouds move 120 m is too long for those of 200 m, one of 90 m is not.
+  const auto outrun = ::testing::Contains(::testing::HasSubstr("in a step of heat"));
+  const std::string fast = head + "drift_m_s = 6\ndrift_from_deg = 90\n[thermal]\nfirst_step_s = ";
+  const auto coarse = scenario(fast + "20\n");
+  ASSERT_TRUE(coarse.has_value()) << coarse.error().text;
+  EXPECT_THAT(coarse->warnings, outrun);
+  EXPECT_THAT(coarse->warnings, ::testing::Contains(::testing::HasSubstr(
+                                    "move 120 m in a step of heat (thermal.first_step_s = 20.0 s), "
+                                    "more than half of clouds.shortest_m (200.0 m), which smears "
+                                    "their shade in time; take 17 s")));
+  const auto fine = scenario(fast + "15\n");
+  ASSERT_TRUE(fine.has_value()) << fine.error().text;
+  EXPECT_THAT(fine->warnings, ::testing::Not(outrun));
+}
+
 TEST_F(ConfigTest, endings_of_scene_files_may_be_upper_case) {
   for (const std::string name : {"TRUCK.GLB", "truck.Gltf"}) {
     const auto loaded = scenario("[[object]]\ngltf = \"" + name + "\"\n");

@@ -173,7 +173,7 @@ TEST_P(ShippedScenario, loads_prints_and_loads_again) {
 
 INSTANTIATE_TEST_SUITE_P(Each, ShippedScenario,
                          ::testing::Values("box", "statue", "block-on-road", "ribbed", "airfield",
-                                           "engage", "decoys", "sea"),
+                                           "engage", "decoys", "sea", "fair-weather"),
                          [](const auto& each) {
                            std::string name = each.param;
                            std::replace(name.begin(), name.end(), '-', '_');

@@ -84,6 +84,11 @@ struct ClutterDraft {
   std::string material;
   scene::Clutter clutter;
 };
+struct CloudsDraft {
+  physics::Clouds clouds;
+  std::optional<double> drift_m_s;
+  std::optional<double> drift_from_rad;
+};
 struct DaemonHead {
   std::string scenario;
 };
@@ -108,6 +113,9 @@ struct DaemonHead {
 [[nodiscard]] const KeyTable<scene::ChannelDetector>& detector_keys();
 [[nodiscard]] const KeyTable<ObjectDraft>& object_keys();
 [[nodiscard]] const KeyTable<scene::ContactDesc>& contact_keys();
+[[nodiscard]] const KeyTable<CloudsDraft>& clouds_keys();
+/// Returns the keys of clouds, for the printed configuration.
+[[nodiscard]] CloudsDraft clouds_draft(const physics::Clouds& clouds);
 [[nodiscard]] const KeyTable<ClutterDraft>& clutter_keys();
 [[nodiscard]] const KeyTable<scene::PlumeDesc>& plume_keys();
 [[nodiscard]] const KeyTable<scene::FlareDesc>& flare_keys();

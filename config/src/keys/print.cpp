@@ -116,7 +116,15 @@ std::string print_scenario(const scene::ScenarioDesc& scenario) {
   if (!scenario.weather.empty()) {
     std::erase_if(weather_table, [](const auto& key) { return key.spec.name != "sample"; });
   }
+  if (scenario.clouds) {
+    std::erase_if(weather_table, [](const auto& key) {
+      return key.spec.name == "cloud_frac" || key.spec.name == "cloud_base_m";
+    });
+  }
   print_section("[weather]", weather, weather_table, out);
+  if (scenario.clouds) {
+    print_section("[clouds]", clouds_draft(*scenario.clouds), clouds_keys(), out);
+  }
 
   AtmosphereDraft atmosphere;
   atmosphere.enabled = scenario.atmosphere.enabled;

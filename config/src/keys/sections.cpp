@@ -23,6 +23,11 @@ const std::vector<SectionDoc>& scenario_sections() {
                   "last one, but for rain, which ends with its row. The columns of the CSV file "
                   "have the same names.",
                   weather_sample_keys(), scene::WeatherSample{}),
+      section_doc("clouds", false,
+                  "Clouds with structure ([clouds.md](../renderer/docs/clouds.md)): a layer that "
+                  "shades the sun from place to place, drifts, and shows in the sky. It needs "
+                  "`thermal.method` cached and `thermal.model` foster.",
+                  clouds_keys(), CloudsDraft{}),
       section_doc("atmosphere", false, "The air between surface and sensor.", atmosphere_keys(),
                   AtmosphereDraft{}),
       section_doc("atmosphere.band", true, "Transmittance of one band, as terms or as a table.",

@@ -74,6 +74,11 @@ void check_material_name(const std::string& name, const std::vector<scene::Mater
 void resolve_clutter(const Node& root, const scene::ThermalOptions& thermal,
                      const std::vector<std::string>& known_bands,
                      std::vector<scene::Material>& materials, Diagnostics& diagnostics);
+/// Reads clouds with structure, and gives the models of the clear sky the same cover and base.
+/// Reports a thermal method that has none, wavelengths that do not fit each other, keys of
+/// [weather] that say the same, and a drift without a direction. The weather of the scenario is
+/// read already.
+void resolve_clouds(const Node& root, scene::ScenarioDesc& scenario, Diagnostics& diagnostics);
 /// Reads plumes, flares, smoke and fires. Reports objects, parts and bands that do not exist, and
 /// more puffs than a frame may hold.
 [[nodiscard]] scene::GasDesc resolve_gas(const Node& root,

@@ -47,6 +47,22 @@ SkyState sky_state(double longwave_down_w_m2, double air_k, double dew_point_k, 
   return state;
 }
 
+SkyState sky_of_cover(double longwave_down_w_m2, double air_k, double dew_point_k,
+                      double cover_frac, double base_m) noexcept {
+  EMIT_DCHECK(air_k > 0.0);
+  const double wanted = std::max(longwave_down_w_m2, 0.0);
+  const double clear = sky_longwave_w_m2(Kelvin(air_k), Kelvin(dew_point_k), 0.0);
+  const double warmest = std::max(kStefanBoltzmannWPerM2K4 * std::pow(air_k, 4.0), clear);
+  const double overcast =
+      cover_frac > 0.0
+          ? std::clamp((wanted - (1.0 - cover_frac) * clear) / cover_frac, clear, warmest)
+          : clear;
+  const double reached = (1.0 - cover_frac) * clear + cover_frac * overcast;
+  const double ratio = std::pow(std::max(wanted / reached, 1e-8), 0.25);
+  return {cover_frac, base_m, std::pow(overcast / kStefanBoltzmannWPerM2K4, 0.25) * ratio,
+          air_k * (ratio - 1.0)};
+}
+
 double tilted_cosine(double normal_up, double sin_elevation) noexcept {
   const double up = normal_up * sin_elevation;
   const double across = std::sqrt(std::max(0.0, 1.0 - normal_up * normal_up)) *

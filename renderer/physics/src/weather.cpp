@@ -112,7 +112,7 @@ Forcing forcing_from_clear_sky(const ClearSky& model, const GeoPlace& place, con
   f.environment_k = air.value();
   f.wind_m_s = model.wind_m_s;
   set_wind_direction(model.wind_from_rad, f);
-  f.cloud_frac = model.cloud_frac;
+  f.cloud_frac = model.cloud_frac * (1.0 - model.cloud_transmission_frac);
   return with_vapour(at_place(f, place, sun), model.dew_point_k);
 }
 

@@ -37,7 +37,10 @@ double SkyDiscs::radiance_w_m2_sr(const BandRadiance& band, const SolveView& vie
   if (!near_sun && !near_moon) return 0.0;
 
   constexpr int kSide = 16;
-  const double sensor_m = view.sensor_pose.position_world_m.z;
+  const glm::dvec3& eye_m = view.sensor_pose.position_world_m;
+  const double sensor_m = eye_m.z;
+  const CloudSun* const clouds = climate->clouds();
+  const bool below = clouds != nullptr && sensor_m < clouds->clouds().base_m;
   double sum = 0.0;
   for (int i = 0; i < kSide * kSide; ++i) {
     const glm::dvec3 d = ray(column + (i % kSide + 0.5) / kSide, row + (i / kSide + 0.5) / kSide);
@@ -52,9 +55,12 @@ double SkyDiscs::radiance_w_m2_sr(const BandRadiance& band, const SolveView& vie
       const double cosine = std::max(glm::dot(normal, moon.to_sun_enu), 0.0);
       const double kelvin =
           std::max(physics::kMoonSubsolarK * std::sqrt(std::sqrt(cosine) / moon.sun_au), 100.0);
-      sum += band.moon(kelvin, cosine, moon.sun_au, sensor_m, d.z);
+      const double open_frac = below ? 1.0 - clouds->opacity_frac(eye_m, d, view.sim_time_ns) : 1.0;
+      sum += open_frac * band.moon(kelvin, cosine, moon.sun_au, sensor_m, d.z);
     } else if (near_sun && glm::dot(d, sun.direction_enu) > std::cos(sun_rad)) {
-      sum += band.sun_disc(beam_frac, sensor_m, d.z);
+      const double cloud_sun =
+          below ? clouds->by_mean(eye_m, d, now.direct_normal_w_m2, view.sim_time_ns) : 1.0;
+      sum += band.sun_disc(cloud_sun * beam_frac, sensor_m, d.z);
     }
   }
   return sum / (kSide * kSide);

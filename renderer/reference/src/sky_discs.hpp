@@ -5,6 +5,7 @@
 #include "emit/physics/sky/moon.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/reference/solve.hpp"
+#include "emit/reference/surface_forcing.hpp"
 #include "solve_radiance.hpp"
 
 namespace emit::reference {
@@ -14,7 +15,9 @@ namespace emit::reference {
 struct SkyDiscs {
   physics::SunPosition sun;
   physics::MoonPosition moon;
-  double beam_frac = 0.0;  ///< share of a clear sky's direct sun that shines
+  double beam_frac = 0.0;                   ///< share of a clear sky's direct sun that shines
+  const SurfaceClimate* climate = nullptr;  ///< with its broken clouds, if there are any
+  ClimateNode now;                          ///< climate at the instant
 
   /// Returns what the discs add to a pixel of the sky, W m-2 sr-1.
   [[nodiscard]] double radiance_w_m2_sr(const BandRadiance& band, const SolveView& view,

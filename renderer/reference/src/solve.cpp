@@ -402,19 +402,27 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
   const physics::SunPosition sun =
       physics::sun_position(scenario.epoch_utc_ns + view.sim_time_ns, place);
   const double cloud_frac = cloud_frac_at(scenario, view.sim_time_ns);
-  const double beam_frac =
-      (1.0 - cloud_frac) * physics::beam_share_frac(now.direct_normal_w_m2, sun, place.height,
+  const double beam_frac = physics::beam_share_frac(now.direct_normal_w_m2, sun, place.height,
                                                     scenario.clear_sky.linke_turbidity);
   const double dew_point_k = scenario.weather.empty()
                                  ? scenario.clear_sky.dew_point_k
                                  : physics::usual_dew_point_k(scene::mean_air_k(scenario));
-  const physics::SkyState sky_now = sky_by_bisection(now.longwave_down_w_m2, now.air_k, dew_point_k,
-                                                     cloud_frac, scenario.clear_sky.cloud_base);
+  const physics::SkyState sky_now =
+      scenario.clouds
+          ? covered_sky_by_bisection(now.longwave_down_w_m2, now.air_k, dew_point_k,
+                                     scenario.clouds->cover_frac, scenario.clouds->base_m)
+          : sky_by_bisection(now.longwave_down_w_m2, now.air_k, dew_point_k, cloud_frac,
+                             scenario.clear_sky.cloud_base);
+  const CloudSun* const clouds = climate->clouds();
   const double sensor_m = view.sensor_pose.position_world_m.z;
   // Above the clouds the sun is that of a clear sky.
-  const double beam_above_frac = cloud_frac < 1.0 ? beam_frac / (1.0 - cloud_frac) : beam_frac;
+  const double taken_frac =
+      scenario.clouds ? (1.0 - scenario.clouds->transmission_frac) * scenario.clouds->cover_frac
+                      : cloud_frac;
+  const double beam_above_frac = taken_frac < 1.0 ? beam_frac / (1.0 - taken_frac) : beam_frac;
   const SkyDiscs discs{sun, physics::moon_position(scenario.epoch_utc_ns + view.sim_time_ns, place),
-                       sensor_m >= sky_now.cloud_base_m ? beam_above_frac : beam_frac};
+                       sensor_m >= sky_now.cloud_base_m ? beam_above_frac : beam_frac, &*climate,
+                       now};
   std::vector<double> face_k;
   if (solid) {
     face_k.resize(solid->solver().faces().size());
@@ -469,10 +477,16 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
           static_cast<float>(band.at_aperture(leaving, sensor_m, hit.range_m, hit.direction));
     });
     // Fill the pixels of the sky.
+    if (clouds != nullptr) band.part_clouds(sensor_m);
     for (std::size_t p = 0; p < sky_rays.size(); ++p) {
       if (sky_rays[p] == glm::dvec3(0.0)) continue;
-      plane[p] = static_cast<float>(band.sky(sensor_m, sky_rays[p]) +
-                                    discs.radiance_w_m2_sr(band, view, p));
+      double sky = band.sky(sensor_m, sky_rays[p]);
+      if (clouds != nullptr) {
+        const double opacity =
+            clouds->opacity_frac(view.sensor_pose.position_world_m, sky_rays[p], view.sim_time_ns);
+        sky = std::lerp(sky, band.cloud(sensor_m, sky_rays[p]), opacity);
+      }
+      plane[p] = static_cast<float>(sky + discs.radiance_w_m2_sr(band, view, p));
     }
   }
 }
@@ -559,7 +573,8 @@ Result<SolvedImage> SceneSolver::image(const SolveView& view) {
           instant
               .sun_visible_frac_clipped(
                   {hits[i].point.position_world_m, hits[i].point.normal, 1e-9}, to_sun)
-              .value_frac;
+              .value_frac *
+          d.climate->cloud_sun(now, hits[i].point.position_world_m);
     });
   }
   d.note_temperatures(hits, kelvin, view.sim_time_ns);

@@ -111,6 +111,12 @@ SolveFingerprint fingerprint(const scene::ScenarioDesc& scenario,
     weather.add(v);
   }
   weather.add(sky.wind_from_rad).add(sky.cloud_base.height_m).add(sky.cloud_base.kelvin);
+  weather.add(sky.cloud_transmission_frac).add(scenario.clouds.has_value());
+  if (scenario.clouds) {
+    const physics::Clouds& c = *scenario.clouds;
+    weather.add(c.cover_frac).add(c.base_m).add(c.transmission_frac).add(c.shortest_m);
+    weather.add(c.longest_m).add(c.slope).add(c.seed).add(c.drift_m_s).add(c.drift_from_rad);
+  }
   for (const scene::WeatherSample& w : scenario.weather) {
     weather.add(w.sim_time_ns).add(w.direct_normal_w_m2).add(w.diffuse_horizontal_w_m2);
     weather.add(w.longwave_down_w_m2).add(w.air_k).add(w.wind_m_s).add(w.cloud_frac);

@@ -65,8 +65,10 @@ class PointViews {
       const auto [sample, sun] = look(nodes_ns[i], instants[i]);
       if (i > 0) {
         const std::int64_t step = nodes_ns[i] - nodes_ns[i - 1];
+        const bool moves =
+            step < kStaticStepNs && (climate_.clouds() == nullptr || step <= kMovingStepNs);
         refine(nodes_ns[i - 1], last_sun, nodes_ns[i], sun,
-               step < kStaticStepNs   ? kShortestMovingNs
+               moves                  ? kShortestMovingNs
                : step > kStaticStepNs ? kShortestSpinUpNs
                                       : kShortestStaticNs);
       }
@@ -135,6 +137,7 @@ class PointViews {
     double sun = 0.0;
     if (cosine > 0.0 && now.direct_normal_w_m2 > 0.0) {
       sun = absent ? 1.0 : instant.sun_visible_frac_clipped(p, to_sun).value_frac;
+      sun *= climate_.cloud_sun(now, p.position_world_m);
     }
     sample.sky_frac = absent ? 0.5 * (1.0 + p.normal.z) : sky_frac(instant, p);
     if (point_.entity == kNoEntity) {
@@ -210,8 +213,14 @@ void PointHistories::choose_nodes(std::int64_t until_ns,
     t += left < 2 * kSpinUpStepNs ? left : kSpinUpStepNs;
     nodes_ns.push_back(t);
   }
+  // Clouds pass within that time. Steps of one kind are told from those of others by their length.
+  std::int64_t static_ns = kStaticStepNs;
+  if (climate_.clouds() != nullptr) {
+    static_ns = std::clamp<std::int64_t>(std::llround(1e9 * climate_.clouds()->step_s()),
+                                         kMovingStepNs + 1, kStaticStepNs);
+  }
   while (t < until_ns) {
-    const std::int64_t next = std::min(until_ns, t + kStaticStepNs);
+    const std::int64_t next = std::min(until_ns, t + static_ns);
     // Look in the middle as well: a keyframe between the ends moves too.
     const SceneInstant here = scene_.at(t);
     bool moving = false;

@@ -12,6 +12,7 @@
 #include "emit/physics/clear_sky.hpp"
 #include "emit/physics/constants.hpp"
 #include "emit/physics/sky/moon.hpp"
+#include "emit/reference/cloud_sun.hpp"
 
 namespace emit::reference {
 namespace {
@@ -110,6 +111,33 @@ physics::SkyState sky_by_bisection(double longwave_down_w_m2, double air_k, doub
   return sky;
 }
 
+physics::SkyState covered_sky_by_bisection(double longwave_down_w_m2, double air_k,
+                                           double dew_point_k, double cover_frac, double base_m) {
+  const auto black = [](double kelvin) {
+    return physics::kStefanBoltzmannWPerM2K4 * std::pow(kelvin, 4.0);
+  };
+  const double dew_c = dew_point_k - physics::kZeroCelsiusK;
+  const double emissivity = std::min(1.0, 0.758 + 5.21e-3 * dew_c + 6.25e-5 * dew_c * dew_c);
+  const double clear = emissivity * black(air_k);
+  const auto sent = [&](double kelvin) {
+    return (1.0 - cover_frac) * clear + cover_frac * black(kelvin);
+  };
+  double low_k = air_k * std::pow(emissivity, 0.25);
+  double high_k = air_k;
+  for (int i = 0; i < 80; ++i) {
+    const double middle_k = 0.5 * (low_k + high_k);
+    (sent(middle_k) < longwave_down_w_m2 ? low_k : high_k) = middle_k;
+  }
+  // The rest, which the clouds cannot take, warms or cools all of the sky.
+  const double warmth = std::pow(std::max(longwave_down_w_m2 / sent(low_k), 1e-8), 0.25);
+  physics::SkyState sky;
+  sky.cloud_cover_frac = cover_frac;
+  sky.cloud_base_m = base_m;
+  sky.cloud_k = low_k * warmth;
+  sky.warmer_k = air_k * (warmth - 1.0);
+  return sky;
+}
+
 physics::Result<BandRadiance> BandRadiance::create(const scene::ScenarioDesc& scenario,
                                                    std::size_t band) {
   BandRadiance out(scenario.bands[band]);
@@ -156,6 +184,7 @@ physics::Result<BandRadiance> BandRadiance::create(const scene::ScenarioDesc& sc
 void BandRadiance::set_air(double air_k, const physics::SunPosition& sun, double beam_frac,
                            double beam_above_frac, const physics::SkyState& sky_now) {
   air_ = black(air_k);
+  parted_ = false;
   sky_now_ = sky_now;
   sky_air_ = black(air_k + sky_now.warmer_k);
   cloud_ = black(sky_now.cloud_k);
@@ -295,7 +324,7 @@ double BandRadiance::sky(double sensor_m, double sin_elevation,
                          const physics::SunScatter::Kinds& phase_per_sr) const {
   if (!has_air_) return 0.0;
   double clear_w_m2_sr = 0.0;
-  double cover = sky_now_.cloud_cover_frac;
+  double cover = parted_ ? 0.0 : sky_now_.cloud_cover_frac;
   if (column_) {
     const auto path = physics::AirPath::to_space(*column_, place_m_ + sensor_m,
                                                  std::asin(std::clamp(sin_elevation, -1.0, 1.0)));
@@ -309,6 +338,38 @@ double BandRadiance::sky(double sensor_m, double sin_elevation,
     clear_w_m2_sr = sky_air_ * (1.0 - std::pow(vertical_frac_, air_mass(sin_elevation)));
   }
   return (1.0 - cover) * clear_w_m2_sr + cover * cloud_;
+}
+
+void BandRadiance::part_clouds(double sensor_m) {
+  parted_ = true;
+  cloud_base_ = cloud_;
+  if (!column_ || sensor_m >= sky_now_.cloud_base_m) return;
+  // Find the base for which level ground sees as much of the clouds as of an even sky.
+  constexpr int kRings = 180;
+  double through = 0.0;
+  double path = 0.0;
+  for (int i = 0; i < kRings; ++i) {
+    const double elevation = (i + 0.5) / kRings * physics::kPi / 2.0;
+    const double weight = std::sin(2.0 * elevation) * physics::kPi / 2.0 / kRings;
+    const glm::dvec3 direction(std::cos(elevation), 0.0, std::sin(elevation));
+    const auto way =
+        physics::AirPath::between(*column_, place_m_ + sensor_m, place_m_ + sky_now_.cloud_base_m,
+                                  CloudSun::range_m(sky_now_.cloud_base_m - sensor_m, direction));
+    through += weight * air_terms_->transmittance(way, physics::AirSource::black_300k);
+    path += weight * air_terms_->path_radiance_w_m2_sr(way, warmer_k_);
+  }
+  cloud_base_ =
+      std::clamp((cloud_ - path) / std::max(through, 1e-6), black(200.0), std::max(air_, cloud_));
+}
+
+double BandRadiance::cloud(double sensor_m, const glm::dvec3& direction) const {
+  if (!has_air_) return 0.0;
+  if (!column_ || sensor_m >= sky_now_.cloud_base_m) return cloud_;
+  const auto way =
+      physics::AirPath::between(*column_, place_m_ + sensor_m, place_m_ + sky_now_.cloud_base_m,
+                                CloudSun::range_m(sky_now_.cloud_base_m - sensor_m, direction));
+  return air_terms_->transmittance(way, physics::AirSource::black_300k) * cloud_base_ +
+         air_terms_->path_radiance_w_m2_sr(way, warmer_k_);
 }
 
 double BandRadiance::to_space(double sensor_m, double sin_elevation,
@@ -331,8 +392,9 @@ double BandRadiance::sun_disc(double beam_frac, double sensor_m, double sin_elev
 
 double BandRadiance::moon(double kelvin, double sun_cosine, double sun_au, double sensor_m,
                           double sin_elevation) const {
-  const double clear =
-      has_air_ && sensor_m < sky_now_.cloud_base_m ? 1.0 - sky_now_.cloud_cover_frac : 1.0;
+  const double clear = has_air_ && !parted_ && sensor_m < sky_now_.cloud_base_m
+                           ? 1.0 - sky_now_.cloud_cover_frac
+                           : 1.0;
   const double sunlight = sun_outside_w_m2_ / (sun_au * sun_au) * sun_cosine;
   return clear * to_space(sensor_m, sin_elevation, physics::AirSource::black_300k) *
          (physics::kMoonEmissivityFrac * black(kelvin) +

@@ -40,6 +40,12 @@ class BandIntegral {
                                                  double dew_point_k, double cloud_frac,
                                                  const physics::CloudBase& base);
 
+/// Returns the sky of a known cover, with clouds at a known height, by bisection over the
+/// temperature of its clouds. The renderer's physics::sky_of_cover() has the closed form.
+[[nodiscard]] physics::SkyState covered_sky_by_bisection(double longwave_down_w_m2, double air_k,
+                                                         double dew_point_k, double cover_frac,
+                                                         double base_m);
+
 /// Radiance that leaves a surface and radiance that arrives at the camera, in one band. The stages
 /// are those of the renderer, with the scenario's atmosphere.
 class BandRadiance {
@@ -81,6 +87,11 @@ class BandRadiance {
   /// Returns the radiance of the sky in a direction, W m-2 sr-1, from a height above the world's
   /// origin.
   [[nodiscard]] double sky(double sensor_m, const glm::dvec3& direction) const;
+  /// Takes the clouds of sky() apart, for the picture of a camera at a height: what sky_mean() says
+  /// stays. sky() is then that between the clouds.
+  void part_clouds(double sensor_m);
+  /// Returns the radiance of a cloud in a direction, behind the air. @pre part_clouds()
+  [[nodiscard]] double cloud(double sensor_m, const glm::dvec3& direction) const;
 
  private:
   explicit BandRadiance(const scene::SpectralBand& band) : integral_(band), name_(band.name) {}
@@ -111,8 +122,10 @@ class BandRadiance {
   double sky_warmer_k_ = 0.0;  ///< the same in the sky
   physics::SkyState sky_now_;
   bool has_air_ = false;
-  double cloud_ = 0.0;    ///< radiance of the clouds, W m-2 sr-1
-  double sky_air_ = 0.0;  ///< blackbody as warm as the air of the sky
+  double cloud_ = 0.0;       ///< radiance of the clouds, W m-2 sr-1
+  bool parted_ = false;      ///< part_clouds()
+  double cloud_base_ = 0.0;  ///< of parted clouds, before the air
+  double sky_air_ = 0.0;     ///< blackbody as warm as the air of the sky
   double air_ = 0.0;
   static constexpr std::size_t kTiltSteps = 90;
   std::array<double, kTiltSteps + 1> sky_means_{};  ///< by tilt, every 2 degrees

@@ -181,6 +181,9 @@ void SolidRadiation::drive(double time_s, std::span<const double> face_k, const 
   for (std::size_t f = 0; f < n; ++f) {
     direct_w_m2_[f] = now.direct_normal_w_m2 * sun_frac_[f] *
                       std::max(0.0, glm::dot(surfaces_[f].normal, to_sun));
+    if (climate_.clouds() != nullptr && direct_w_m2_[f] > 0.0) {
+      direct_w_m2_[f] *= climate_.cloud_sun(now, surfaces_[f].centre_m);
+    }
   }
   // Compute the radiation between the faces, or take all of them for surroundings.
   const ExchangeSky sky = exchange_sky(now, climate_.surroundings_reflectance_frac());
@@ -268,6 +271,9 @@ SolidOptions SolidHistory::solid_options() const {
   solid.tolerance_k = options_.tolerance_k / (options_.refine * options_.refine);
   solid.first_step_s = 1.0;
   solid.max_step_s = kMaxHistoryStepS / options_.refine;
+  if (climate_.clouds() != nullptr) {
+    solid.max_step_s = std::min(solid.max_step_s, climate_.clouds()->step_s());
+  }
   return solid;
 }
 

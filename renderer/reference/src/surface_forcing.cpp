@@ -187,9 +187,15 @@ ClimateNode SurfaceClimate::at(std::int64_t time_ns) const noexcept {
           mix(a.wet_frac, b.wet_frac)};
 }
 
+double SurfaceClimate::cloud_sun(const ClimateNode& now, const glm::dvec3& point_m) const noexcept {
+  if (clouds_ == nullptr) return 1.0;
+  return clouds_->by_mean(point_m, glm::normalize(now.to_sun), now.direct_normal_w_m2, now.time_ns);
+}
+
 Result<SurfaceClimate> SurfaceClimate::create(const scene::ScenarioDesc& scenario,
                                               const ClimateOptions& options) {
   SurfaceClimate climate;
+  if (scenario.clouds) climate.clouds_ = std::make_shared<const CloudSun>(scenario);
   climate.history_start_ns_ = scenario.thermal.history_start_ns;
   const std::int64_t spin_up_ns = options.spin_up_ns.value_or(scenario.thermal.spin_up_ns);
   const std::int64_t start_ns = climate.history_start_ns_ - std::max<std::int64_t>(0, spin_up_ns);

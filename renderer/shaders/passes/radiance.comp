@@ -9,6 +9,7 @@
 //   EMIT_AIR_SUN    bit per band, if there are any: built-in air that scatters sunlight by day
 //   EMIT_OUTPUTS    planes besides radiance, EMIT_OUTPUT_*
 //   EMIT_CLUTTER    defined: some materials vary from place to place; EMIT_CLUTTER_EMISSIVITY: their emissivity too
+//   EMIT_CLOUDS     defined: broken clouds shade the sun and stand in the sky
 //   EMIT_LOBES      index of the first number of the lobes, if there are glossy materials
 //   EMIT_ROWS       number of blocks of 8 x 8 pixels, one below the other, that a work group computes
 #include "passes/gbuffer.glsl"
@@ -35,6 +36,10 @@ layout(binding = EMIT_TEX_AIR) uniform samplerBuffer air_nodes;
 #define EMIT_LOBE_TABLE(index) texelFetch(band_lut, EMIT_LOBES + (index)).r
 #define EMIT_LOBE_SKY(index) texelFetch(air_nodes, index)
 #include "lib/lobe.glsl"
+#endif
+
+#ifdef EMIT_CLOUDS
+#include "passes/clouds.glsl"
 #endif
 
 // Surface that a pixel shows. For a pixel of the sky only `boresight_m` is used.
@@ -250,6 +255,17 @@ float moon_disc_w_m2_sr(uint band, vec4 sight, vec2 centre, float cover_frac) {
   return cover_frac * through * bands[band].moon_through_frac * sum / weights;
 }
 
+#ifdef EMIT_CLOUDS
+// Radiance of a cloud in a band, `range_m` away. Built-in air lies before it.
+float cloud_w_m2_sr(uint band, float range_m) {
+  float base_w_m2_sr = bands[band].cloud_base_w_m2_sr;
+  if ((EMIT_AIR_MODEL >> band & 1u) == 0u) return base_w_m2_sr;
+  vec4 sight = air_view_node(int(bands[band].air_view_first),
+                             air_view_sight_place(frame.sensor_height_m + clouds.above_m, range_m));
+  return air_view_transmittance(sight.x, range_m) * base_w_m2_sr + air_view_path_w_m2_sr(sight, range_m);
+}
+#endif
+
 // Computes and writes all planes of one pixel.
 void write_pixel(ivec2 px) {
   // Leave pixels outside the window.
@@ -265,6 +281,17 @@ void write_pixel(ivec2 px) {
   float sin_elevation = dot(up, ray) / ray_length;
   bool surface = seen.boresight_m < EMIT_SKY_DEPTH_M;
   float range_m = seen.boresight_m * ray_length;
+#ifdef EMIT_CLOUDS
+  // Find the sun that clouds leave at the surface, or the clouds in the sky.
+  vec3 direction = mat3(frame.relworld_from_sensor) * ray / ray_length;
+  float px_rad = abs(frame.ray_per_px.x) / ray_length;
+  float cloud_away_m = cloud_range_m(direction.z);
+  float cloud = surface ? cloud_sun(range_m * direction, range_m * px_rad / clamp(abs(direction.z), 0.125, 1.0))
+                        : cloud_in_sky(direction, cloud_away_m, px_rad);
+  if (surface) seen.sun_cosine *= cloud;
+#else
+  float cloud = surface ? 1.0 : 0.0;
+#endif
   // All bands look up their built-in air at one place, whether it lies on a surface or in the sky.
   AirPlace air_place = air_view_sky_place(sin_elevation);
   AirPlace sight_place = air_view_sight_place(frame.sensor_height_m + range_m * sin_elevation, range_m);
@@ -288,6 +315,10 @@ void write_pixel(ivec2 px) {
     // The moon hides the sun.
     sun_frac = disc_cover_frac(frame.sun_at_px - vec2(px) - 0.5, frame.sun_radius_px) * (1.0 - moon_frac);
   }
+#ifdef EMIT_CLOUDS
+  if (clouds.above_m > 0.0) sun_frac *= clouds.gain * (1.0 - clouds.depth * cloud);
+  moon_frac *= 1.0 - cloud;
+#endif
 
   // Compute the radiance of each band. Where both sides are cheap the code selects and does not branch, because
   // software rasterisers run both sides of a branch anyway.
@@ -323,6 +354,9 @@ void write_pixel(ivec2 px) {
         radiance_w_m2_sr = sky_radiance_w_m2_sr(i, sin_elevation);
       }
     }
+#ifdef EMIT_CLOUDS
+    if (!surface) radiance_w_m2_sr = mix(radiance_w_m2_sr, cloud_w_m2_sr(i, cloud_away_m), cloud);
+#endif
     if (sun_frac > 0.0) radiance_w_m2_sr += sun_disc_w_m2_sr(i, sight, sun_frac);
     if (moon_frac > 0.0) radiance_w_m2_sr += moon_disc_w_m2_sr(i, sight, moon_centre, moon_frac);
     bool finite = !(isnan(radiance_w_m2_sr) || isinf(radiance_w_m2_sr));
@@ -362,6 +396,7 @@ void write_pixel(ivec2 px) {
     if (lobe.block != 0) glossy = vec4(lobe.normal, lobe.glint_per_sr);
 #endif
     for (int i = 0; i < 4; ++i) planes[plane++ * plane_px + pixel] = glossy[i];
+    planes[plane++ * plane_px + pixel] = cloud;
   }
   // Count the pixel if it is flagged.
   int flags = (nonfinite ? EMIT_FLAG_NONFINITE : 0) + (clamped ? EMIT_FLAG_CLAMPED : 0);
@@ -372,6 +407,9 @@ void main() {
   // Copy the uniforms once for all pixels of the invocation.
   read_frame();
   for (uint i = 0u; i < EMIT_BANDS; ++i) bands[i] = band_uniforms[i];
+#ifdef EMIT_CLOUDS
+  clouds = cloud_uniforms;
+#endif
   // Write one pixel in each block of the work group.
   uvec2 first_px = gl_WorkGroupID.xy * uvec2(8u, 8u * EMIT_ROWS) + gl_LocalInvocationID.xy;
   ivec2 px = ivec2(first_px + frame.rendered_window_px.xy);

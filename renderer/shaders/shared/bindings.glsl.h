@@ -11,6 +11,7 @@
 #define EMIT_BIND_SHADE 5
 #define EMIT_BIND_TARGETS 6
 #define EMIT_BIND_GAS 7
+#define EMIT_BIND_CLOUDS 8
 
 // Shader storage blocks. Shaders write them.
 #define EMIT_BIND_OUTPUT 0
@@ -48,6 +49,7 @@
 #define EMIT_TEX_GAS_PUFFS 25
 #define EMIT_TEX_CLUTTER 26
 #define EMIT_TEX_CLUTTER_PIXELS 27
+#define EMIT_TEX_CLOUDS 28
 
 // Image units.
 #define EMIT_IMG_OCCLUSION 0
@@ -108,6 +110,11 @@
 // Steps of a place in a tile, of 24 bits.
 #define EMIT_CLUTTER_PLACE_STEPS 16777215.0
 
+// Clouds: texels along the edge of a tile, levels of the field, and places in a pixel of the sky at most.
+#define EMIT_CLOUD_SIDE 1024
+#define EMIT_CLOUD_LEVELS 11
+#define EMIT_CLOUD_TAPS 8
+
 // Boresight distance that the geometry buffer holds for a pixel without a surface.
 #define EMIT_SKY_DEPTH_M 1e30f
 #define EMIT_MOON_SUBSOLAR_K 394.0f  // physics::kMoonSubsolarK
@@ -119,8 +126,8 @@
 #define EMIT_OUTPUT_OBJECT 4u
 #define EMIT_OUTPUT_SUN 8u
 #define EMIT_OUTPUT_SKY 16u
-// Radiance that arrives at the surface, a plane for each band, then the material, three of its clutter, and the normal
-// and the glint of a glossy surface.
+// Radiance that arrives at the surface, a plane for each band, then the material, three of its clutter, the normal and
+// the glint of a glossy surface, and the clouds.
 #define EMIT_OUTPUT_TERMS 32u
 
 // Indices of FrameStatsGpu.flagged_px.

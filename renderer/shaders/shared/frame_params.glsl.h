@@ -184,8 +184,22 @@ struct BandParams {
   float sun_disc_w_m2_sr;               // radiance of the sun: outside the air if that is built in, else as seen
   float moon_through_frac;              // share of the moon's light that clouds leave, and other air than the built-in one
   float moon_reflected_w_m2_sr;         // sunlight that the moon sends from where the sun stands in the zenith
-  float unused2;
+  float cloud_base_w_m2_sr;             // broken clouds: radiance of their base, behind air that is built in
   vec4 sky_by_tilt_w_m2_sr[EMIT_SKY_TILT_VEC4];  // mean of the sky that a face sees, see lib/sky_tilt.glsl
+};
+
+// Uniform block of broken clouds (passes/clouds.glsl). Heights and places are those of the layer as it lies in the frame.
+struct CloudParams {
+  vec4 tiles_per_m;         // change of a place in tiles per metre to the east (xy) and to the north (zw)
+  vec2 camera_tile;         // the layer above the camera
+  vec2 sun_tile;            // where the sun's ray from the ground below the camera meets the layer
+  vec2 sun_tiles_per_m_up;  // change of that with the height of the point
+  float camera_m;           // height of the camera above the world's origin
+  float above_m;            // height of the layer above the camera; not above 0: it lies below
+  float gain;               // physics::CloudLight
+  float depth;
+  float texels_per_m;
+  float unused0;
 };
 
 // Counters of one frame. Shaders add to them with atomics.
@@ -243,6 +257,10 @@ EMIT_SHARED_OFFSET(BandParams, air_table_first, 64);
 EMIT_SHARED_OFFSET(BandParams, sky_air_radiance_w_m2_sr, 80);
 EMIT_SHARED_OFFSET(BandParams, sun_disc_w_m2_sr, 96);
 EMIT_SHARED_OFFSET(BandParams, sky_by_tilt_w_m2_sr, 112);
+static_assert(sizeof(CloudParams) == 64);
+EMIT_SHARED_OFFSET(CloudParams, camera_tile, 16);
+EMIT_SHARED_OFFSET(CloudParams, camera_m, 40);
+EMIT_SHARED_OFFSET(CloudParams, texels_per_m, 56);
 static_assert(sizeof(FrameStatsGpu) == 16);
 #endif
 

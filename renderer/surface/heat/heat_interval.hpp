@@ -77,7 +77,9 @@ struct ColumnDrive {
 
 /// Input of one sample over one interval, in addition to the forcing that all samples share.
 struct SampleDrive {
-  float sun_frac = 0.0F;  ///< visible share of the sun's disc, mean over the interval
+  /// Visible share of the sun's disc, mean over the interval. Broken clouds multiply it by the sun
+  /// that they leave, by the mean of the weather (IntervalRays::cloud_sun()).
+  float sun_frac = 0.0F;
   /// Share of the sample's sky that entities hide, mean over the interval.
   float hidden_sky_frac = 0.0F;
   /// True if the long-wave terms below include what those entities send. Otherwise the hidden part

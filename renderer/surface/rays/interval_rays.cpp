@@ -114,6 +114,7 @@ void IntervalRays::update(std::int64_t begin_ns, std::int64_t end_ns, std::uint3
                           const Environment& environment, const EntityPoses& poses,
                           const glm::dvec3& origin_world_m) noexcept {
   const std::size_t entities = entity_radius_m_.size();
+  clouds_.update(begin_ns, end_ns, environment, origin_world_m);
   any_entity_on_ = false;
   sun_up_ = false;
   std::ranges::fill(stands_, EntityStand{glm::vec3(0.0F), 0.0F});
@@ -174,6 +175,7 @@ void IntervalRays::bound_packets() noexcept {
 
 void IntervalRays::hold(const glm::dvec3& to_sun) noexcept {
   for (EntityPlacement& place : placements_) place.on = false;
+  clouds_.clear();
   any_entity_on_ = false;
   sun_up_ = to_sun.z > std::sin(StepPlan::kMinSunElevationRad);
   for (std::size_t i = 0; i < kSunRays; ++i) aim(i, 0, to_sun);
@@ -183,6 +185,12 @@ void IntervalRays::hold(const glm::dvec3& to_sun) noexcept {
 glm::vec3 IntervalRays::normal(const SurfaceSample& sample) const noexcept {
   if (sample.entity < 0) return sample.normal;
   return placed(static_cast<std::size_t>(sample.entity), middle_ray_).rel_from_body * sample.normal;
+}
+
+glm::vec3 IntervalRays::position_m(const SurfaceSample& sample) const noexcept {
+  if (sample.entity < 0) return sample.position_m;
+  const EntityPlacement& place = placed(static_cast<std::size_t>(sample.entity), middle_ray_);
+  return place.rel_from_body * sample.position_m + place.position_m;
 }
 
 bool IntervalRays::comes_near(const glm::vec3& start_m, float apart_m, std::size_t entity,

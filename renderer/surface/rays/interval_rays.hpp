@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "history/cloud_shade.hpp"
 #include "history/entity_stand.hpp"
 #include "history/environment.hpp"
 #include "history/pose_history.hpp"
@@ -30,7 +31,7 @@ struct HiddenSky {
 };
 
 /// Visible share of the sun's disc, mean over the part of an interval in which the sun stands
-/// before the face.
+/// before the face. Clouds are left out.
 struct SunShare {
   float frac = 0.0F;  ///< with the shade of everything
   /// Share with the shade of static geometry alone. On the surfaces of an entity it equals `frac`.
@@ -83,6 +84,15 @@ class IntervalRays {
     return sun_share(rays, sample, start_offset_m, blur_m).frac;
   }
 
+  /// Returns the direct sun that broken clouds leave at a sample, mean over the interval, by the
+  /// mean of the weather; 1 without such clouds. Any thread; RT-safe.
+  [[nodiscard]] float cloud_sun(const SurfaceSample& sample) const noexcept {
+    return clouds_.any() ? clouds_.by_mean(position_m(sample)) : 1.0F;
+  }
+
+  /// Returns whether cloud_sun() differs from 1.
+  [[nodiscard]] bool clouds_pass() const noexcept { return clouds_.any(); }
+
   /// Bits of points of a face; see spots().
   struct Spots {
     std::uint32_t faced = 0;  ///< the sun stood before the face
@@ -121,6 +131,8 @@ class IntervalRays {
   }
   /// Returns the outward normal of a sample in the middle of the interval, in world axes.
   [[nodiscard]] glm::vec3 normal(const SurfaceSample& sample) const noexcept;
+  /// Returns the place of a sample in the middle of the interval, rel.
+  [[nodiscard]] glm::vec3 position_m(const SurfaceSample& sample) const noexcept;
 
  private:
   [[nodiscard]] const EntityPlacement& placed(std::size_t entity, std::size_t ray) const noexcept {
@@ -173,6 +185,7 @@ class IntervalRays {
   /// Computes the balls, and how far the directions of each packet spread.
   void bound_packets() noexcept;
 
+  CloudShade clouds_;
   std::vector<float> entity_radius_m_;
   SkyMeasure sky_ = SkyMeasure::cosine;
   std::vector<EntityAnchor> anchors_;        ///< by entity, or empty

@@ -109,7 +109,7 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   const std::int64_t start_ns = model_->at_ns;
   // Complete the first interval.
   begin_first_interval(start_ns, inputs, plan, history);
-  fill_first_vertices();
+  fill_first_vertices(inputs.environment.clouds() != nullptr);
   // Save the surface before the outputs of node 0 change.
   const bool made_anew = model_->drawn.empty();
   if (made_anew) {
@@ -195,12 +195,12 @@ void CachedSurface::begin_first_interval(std::int64_t start_ns, const Inputs& in
   interval_.finish(nodes_[0], nodes_[1], model_->samples, nullptr, workers_);
 }
 
-void CachedSurface::fill_first_vertices() {
+void CachedSurface::fill_first_vertices(bool clouds) {
   SurfaceNode& first = nodes_[0];
   const std::vector<SurfaceSample>& all = model_->samples.samples;
   for (std::uint32_t i = 0; i < all.size(); ++i) {
     if (all[i].vertex == kNoSample) continue;
-    const bool moves = geometry_.entities() != 0 && all[i].entity < 0;
+    const bool moves = clouds || (geometry_.entities() != 0 && all[i].entity < 0);
     first.vertices[all[i].vertex] = {first.outputs[i].offset_k,
                                      nodes_[moves ? 1 : 0].outputs[i].sun_frac};
   }
@@ -375,9 +375,9 @@ void CachedSurface::advance(std::int64_t now_ns, const Inputs& inputs,
   }
   // Advance blocks on their own and exposure tiles to now.
   run_local(now_ns, inputs, history);
-  exposure_tiles_->run(
-      now_ns, model_->samples,
-      {inputs.environment, inputs.entities, geometry_.rays(), workers_, entity_shadows_.maps()});
+  exposure_tiles_->run(now_ns, model_->samples,
+                       {inputs.environment, inputs.entities, geometry_.rays(), workers_,
+                        entity_shadows_.maps(), geometry_.origin_world_m()});
   fraction_ = nodes_.fraction(now_ns);
   // Continue with node 1 while sim time stands still.
   if (renewing_ && now_ns == last_now_ns_) shares_.move_back(kHeldFrames);

@@ -188,8 +188,9 @@ class CachedSurface {
   void begin_first_interval(std::int64_t start_ns, const Inputs& inputs, const StepPlan& plan,
                             SurfaceHistory& history);
   /// Fills the vertices of node 0. Shares of the sun leave the shade of entities on static surfaces
-  /// out, which exposure tiles and shadow maps add.
-  void fill_first_vertices();
+  /// out, which exposure tiles and shadow maps add, and that of broken clouds, which the radiance
+  /// pass adds.
+  void fill_first_vertices(bool clouds);
   /// Writes the model with the states and outputs of node 0, which it lends to the model.
   [[nodiscard]] physics::Result<void> save(const SurfaceWarmUp& warm_up, const SavedSurface& saved);
   /// Makes the exposure tiles and the first shadow depth maps.

@@ -124,7 +124,7 @@ SampleDrive drive_of(const SurfaceStep& step, const IntervalRays& interval_rays,
   const SurfaceSample& sample = viewed.sample();
   const ViewOfNow& view = viewed.view();
   SampleDrive drive;
-  drive.sun_frac = sun.frac;
+  drive.sun_frac = sun.frac * interval_rays.cloud_sun(sample);
   drive.take_entity(entities, sample);
   if (sample.body >= 0) drive.body_k = step.body_k[static_cast<std::size_t>(sample.body)];
   // Replace the sky behind entities by the long-wave radiation of the one that hides most.

@@ -2,6 +2,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <glm/ext/vector_double3.hpp>
 #include <span>
 
 #include "history/environment.hpp"
@@ -20,6 +21,7 @@ struct ExposureInputs {
   const CasterRays& rays;
   threads::WorkerPool& workers;
   EntityShadowMaps& shadow_maps;
+  glm::dvec3 origin_world_m{0.0};  ///< of rel
 };
 
 /// One step of exposure tiles: the stretch of sim time that it covers and the tiles that take part.

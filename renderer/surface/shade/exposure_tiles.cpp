@@ -4,12 +4,20 @@
 #include <algorithm>
 #include <utility>
 
+#include "history/cloud_shade.hpp"
+
 namespace emit::renderer {
 namespace {
 
 /// Sine of the lowest sun that tiles are made for. A lower sun draws shadows too long for them and
 /// hardly warms level ground.
 constexpr double kMinSunSine = 0.05;
+
+/// The middle of a tile.
+glm::vec3 middle_of(const ExposureTile& tile) noexcept {
+  const float half_m = 0.5F * static_cast<float>(ExposureTile::kSide - 1) * tile.texel_m;
+  return {tile.first_m + half_m, tile.plane_m};
+}
 
 /// Share of older shade that is left after `turns` turns, by mode.
 glm::vec4 left_after(std::int64_t turns) noexcept {
@@ -83,11 +91,14 @@ void ExposureTiles::take_turn(std::int64_t turn, std::int64_t turns, ExposureSte
   const physics::SunPosition sun = inputs.environment.sun_at(step.middle_ns());
   casts_.clear();
   float flux_frac = 0.0F;
+  CloudShade clouds;
   // List which entity casts on which tile.
   if (sun.direction_enu.z > kMinSunSine) {
     const physics::Forcing forcing = inputs.environment.forcing_at(step.middle_ns(), sun);
     flux_frac = static_cast<float>(forcing.direct_normal_w_m2 * (1.0 - forcing.cloud_frac) /
                                    ShadeResponse::kFullSunWM2);
+    // Under a cloud there is less sun for an entity to keep off.
+    clouds.update(step.begin_ns(), step.end_ns, inputs.environment, inputs.origin_world_m);
     slope_ = glm::vec2(sun.direction_enu) / static_cast<float>(sun.direction_enu.z);
     if (casts_.list(step, sun.direction_enu, inputs, pool_, vertices_)) short_turn_ = turn;
   }
@@ -103,7 +114,8 @@ void ExposureTiles::take_turn(std::int64_t turn, std::int64_t turns, ExposureSte
       const glm::vec4 left = left_after(turn - tile.at_turn);
       tile.at_turn = turn;
       if (step.covers(tile.cast_turn)) {
-        casts_.shade(tile, p, flux_frac, 1.0F - left, inputs.shadow_maps);
+        const float cloud_sun = clouds.any() ? clouds.by_mean(middle_of(tile)) : 1.0F;
+        casts_.shade(tile, p, cloud_sun * flux_frac, 1.0F - left, inputs.shadow_maps);
       } else {
         tile.left_frac *= left;
       }

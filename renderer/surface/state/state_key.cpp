@@ -133,6 +133,12 @@ std::uint64_t weather_hash(const scene::ScenarioDesc& scenario) {
   add_optional(hash, sky.wind_from_rad);
   add_optional(hash, sky.cloud_base.height_m);
   add_optional(hash, sky.cloud_base.kelvin);
+  add(hash, sky.cloud_transmission_frac, scenario.clouds.has_value());
+  if (scenario.clouds) {
+    const physics::Clouds& clouds = *scenario.clouds;
+    add(hash, clouds.cover_frac, clouds.base_m, clouds.transmission_frac, clouds.shortest_m,
+        clouds.longest_m, clouds.slope, clouds.seed, clouds.drift_m_s, clouds.drift_from_rad);
+  }
   return hash.value();
 }
 

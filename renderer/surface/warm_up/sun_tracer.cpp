@@ -19,10 +19,11 @@ SunTracer::SunTracer(const SurfaceInputs& inputs, const SurfaceModelOptions& opt
 }
 
 void SunTracer::trace(const SurfaceSample& sample, std::span<float> sun_frac,
-                      std::span<HiddenSky> hidden_sky) const {
+                      std::span<HiddenSky> hidden_sky, std::span<float> cloud_sun) const {
   const HistoryRecord& record = in_.record;
   EMIT_DCHECK_OP(sun_frac.size(), ==, record.size());
   EMIT_DCHECK(hidden_sky.empty() || hidden_sky.size() == record.size());
+  EMIT_DCHECK(cloud_sun.empty() || cloud_sun.size() == record.size());
   const RayOffsets offsets = ray_offsets(sample.position_m, sample.facet_m);
   // Limit the blur to half of the way over which the surface is a plane: rays must not start beyond
   // an edge. Near the foot of a solid the cells of columns conduct instead.
@@ -38,6 +39,7 @@ void SunTracer::trace(const SurfaceSample& sample, std::span<float> sun_frac,
     if (!hidden_sky.empty()) {
       hidden_sky[i] = rays.hidden_sky(in_.rays, sample, offsets.around_m);
     }
+    if (!cloud_sun.empty()) cloud_sun[i] = rays.cloud_sun(sample);
   }
 }
 

@@ -14,11 +14,12 @@ class SunTracer {
   /// Keeps a reference: `inputs` must outlive the tracer.
   SunTracer(const SurfaceInputs& inputs, const SurfaceModelOptions& options);
 
-  /// Fills the visible share of the sun's disc for each interval of the record and, if there are
-  /// entities, the share of the sky that they hide.
-  /// @pre sun_frac.size() equals the record's intervals; so does hidden_sky.size(), or it is 0
+  /// Fills the visible share of the sun's disc for each interval of the record, if there are
+  /// entities the share of the sky that they hide, and if there are broken clouds the sun that they
+  /// leave.
+  /// @pre sun_frac.size() equals the record's intervals; so do those of the others, or they are 0
   void trace(const SurfaceSample& sample, std::span<float> sun_frac,
-             std::span<HiddenSky> hidden_sky) const;
+             std::span<HiddenSky> hidden_sky, std::span<float> cloud_sun) const;
 
  private:
   const SurfaceInputs& in_;

@@ -203,7 +203,9 @@ void Builder::make_patches() {
       patch.back->object = patch.object;
       patch.back->entity = patch.entity;
     }
-    patch.begin(in_.record.size(), !in_.entities_now.empty(), sampler_.keeps_sent());
+    patch.begin(in_.record.size(), !in_.entities_now.empty(),
+                std::ranges::any_of(in_.record.rays, &IntervalRays::clouds_pass),
+                sampler_.keeps_sent());
     patches_of_mesh_[patch.mesh].push_back(static_cast<std::uint32_t>(patches_.size()));
     sample_count_ += samples_of(patch.mesh);
     patches_.push_back(std::move(patch));

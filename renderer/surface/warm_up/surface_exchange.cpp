@@ -516,6 +516,7 @@ SampleDrive Sweeper::drive(std::size_t s, const glm::vec3& normal, const Window&
   SampleDrive drive;
   const SampleHistories::Rows& rows = histories_.rows[s];
   drive.sun_frac = rows.sun_frac[j];
+  if (!rows.cloud_sun.empty()) drive.sun_frac *= rows.cloud_sun[j];
   drive.take_entity(in_.record.intervals[j].entities, sample);
   if (sample.body >= 0) drive.body_k = bodies_->mean_k(sample.body, j);
   if (!rows.hidden_sky.empty()) drive.hidden_sky_frac = rows.hidden_sky[j].frac;
@@ -856,7 +857,7 @@ SampleHistories take_histories(const SurfaceInputs& inputs, std::vector<SurfaceP
     const bool keeps = patch.sent.length() != 0;
     const auto rows_of = [](SurfacePatch& side, std::size_t vertex) {
       return SampleHistories::Rows{side.sun_frac.row(vertex), side.hidden_sky.row(vertex),
-                                   side.sent.row(vertex)};
+                                   side.cloud_sun.row(vertex), side.sent.row(vertex)};
     };
     for (std::size_t i = 0; i < patch.states.size(); ++i) {
       out.rows[first + i] = rows_of(patch, i);

@@ -14,6 +14,7 @@ struct SampleHistories {
   struct Rows {
     std::span<const float> sun_frac;        ///< by interval
     std::span<const HiddenSky> hidden_sky;  ///< by interval; empty without entities
+    std::span<const float> cloud_sun;       ///< by interval; empty without broken clouds
     /// Radiation and heat that the sample sends out, as a first guess. It is empty if samples
     /// exchange nothing.
     std::span<float> sent_w_m2;

@@ -426,6 +426,7 @@ void PatchSampler::integrate(std::span<const NewSample> samples, StartMemo& memo
   const auto drive_of = [&record](const SurfacePatch& side, std::uint32_t index, std::size_t i) {
     SampleDrive drive;
     drive.sun_frac = side.sun_frac.row(index)[i];
+    if (side.cloud_sun.length() != 0) drive.sun_frac *= side.cloud_sun.row(index)[i];
     drive.longwave_begin_w_m2 = drive.longwave_end_w_m2 = side.held[index].longwave_w_m2;
     drive.take_entity(record.intervals[i].entities, side.samples[index]);
     if (side.hidden_sky.length() != 0) drive.hidden_sky_frac = side.hidden_sky.row(index)[i].frac;
@@ -507,7 +508,8 @@ void PatchSampler::evaluate(std::span<const NewSample> samples, StartMemo& memo)
         look_around(side, index, each.stand);
         leave_foot(side, index, each.stand);
       }
-      tracer_.trace(side.samples[index], side.sun_frac.row(index), side.hidden_sky.row(index));
+      tracer_.trace(side.samples[index], side.sun_frac.row(index), side.hidden_sky.row(index),
+                    side.cloud_sun.row(index));
     };
     SurfacePatch& patch = *each.patch;
     look(patch);
@@ -516,13 +518,14 @@ void PatchSampler::evaluate(std::span<const NewSample> samples, StartMemo& memo)
   integrate(samples, memo);
 }
 
-void SurfacePatch::begin(std::size_t intervals, bool entities, bool keeps_sent) {
+void SurfacePatch::begin(std::size_t intervals, bool entities, bool clouds, bool keeps_sent) {
   EMIT_CHECK(samples.empty());
   begun_ = true;
   sun_frac = RowStore<float>(intervals);
   hidden_sky = RowStore<HiddenSky>(entities ? intervals : 0);
+  cloud_sun = RowStore<float>(clouds ? intervals : 0);
   sent = SentHistory(keeps_sent ? SentRow::length(intervals) : 0);
-  if (back) back->begin(intervals, entities, keeps_sent);
+  if (back) back->begin(intervals, entities, clouds, keeps_sent);
 }
 
 void SurfacePatch::grow(std::size_t vertices) {
@@ -545,6 +548,7 @@ void SurfacePatch::grow(std::size_t vertices) {
   sky_surplus_frac.resize(vertices, kUnknown);
   sun_frac.grow(vertices);
   hidden_sky.grow(vertices);
+  cloud_sun.grow(vertices);
   if (back) back->grow(vertices);
 }
 

@@ -66,6 +66,8 @@ struct SurfacePatch {
   std::vector<float> sky_surplus_frac;
   RowStore<float> sun_frac;        ///< rows by vertex: visible share of the sun in each interval
   RowStore<HiddenSky> hidden_sky;  ///< rows by vertex; the rows are empty without entities
+  /// Rows by vertex: IntervalRays::cloud_sun(); the rows are empty without broken clouds.
+  RowStore<float> cloud_sun;
   /// Patch of the other faces of sheets, with the same vertices; null if the mesh has no sheets.
   std::unique_ptr<SurfacePatch> back;
 
@@ -75,13 +77,13 @@ struct SurfacePatch {
                      glm::length(glm::vec3(rel_from_mesh[1])),
                      glm::length(glm::vec3(rel_from_mesh[2]))});
   }
-  /// Sets the number of intervals that rows hold, whether there are entities, and whether `sent`
-  /// is stored. @pre the patch has no vertices
-  void begin(std::size_t intervals, bool entities, bool keeps_sent);
+  /// Sets the number of intervals that rows hold, whether there are entities and broken clouds,
+  /// and whether `sent` is stored. @pre the patch has no vertices
+  void begin(std::size_t intervals, bool entities, bool clouds, bool keeps_sent);
   /// Makes room for the samples of `vertices` vertices in all.
   /// @pre begin(); vertices never become fewer
   void grow(std::size_t vertices);
-  /// Frees everything but sun_frac, hidden_sky and sent, on both sides of sheets.
+  /// Frees everything but sun_frac, hidden_sky, cloud_sun and sent, on both sides of sheets.
   void free_all_but_rows();
 
  private:

@@ -106,10 +106,14 @@ Result<void> explain_frame(scene::ScenarioDesc& scenario, const ProbeFinder& fin
     surface.temperature_k = static_cast<double>(view.temperature_k[i]);
     surface.clutter_sd = static_cast<double>(view.clutter_sd[i]);
     surface.clutter_k = static_cast<double>(view.clutter_k[i]);
+    surface.cloud_sun = static_cast<double>(view.clouds[i]);
     surface.sky_frac = static_cast<double>(view.sky_frac[i]);
     surface.sun_cosine = static_cast<double>(view.sun_cosine[i]);
     found.surface = surface;
+  } else {
+    found.cloud_frac = static_cast<double>(view.clouds[i]);
   }
+  found.clouds = scenario.clouds.has_value();
   const std::vector<renderer::RadianceTerms> terms = (*frames)->renderer().radiance_terms(
       view, found.px, found.surface ? found.surface->normal.z : 1.0);
   for (std::size_t b = 0; b < scenario.bands.size(); ++b) {

@@ -93,7 +93,11 @@ std::vector<std::vector<std::string>> term_rows(const ExplainedBand& band) {
 }
 
 std::string surface_sentence(const Explanation& found) {
-  if (!found.surface) return "It shows the sky.";
+  if (!found.surface) {
+    if (!found.clouds) return "It shows the sky.";
+    return fmt::format("It shows the sky, of which clouds cover {:.1f} % here.",
+                       100.0 * found.cloud_frac);
+  }
   const ExplainedSurface& s = *found.surface;
   const std::string clutter =
       s.clutter_sd == 0.0
@@ -102,12 +106,19 @@ std::string surface_sentence(const Explanation& found) {
                 " Of its temperature {:+.3f} K are clutter: the field of the material is "
                 "{:+.2f} standard deviations here.",
                 s.clutter_k, s.clutter_sd);
+  const std::string clouds =
+      found.clouds ? fmt::format(
+                         " The clouds let {:.3f} times as much direct sun through here as the "
+                         "weather's mean, which is part of that share.",
+                         s.cloud_sun)
+                   : "";
   return fmt::format(
       "It shows object '{}', material '{}', {:.2f} m away at ({:.3f}, {:.3f}, {:.3f}) m, normal "
       "({:.3f}, {:.3f}, {:.3f}), {:.3f} K. The face sees {:.1f} % sky and takes {:.1f} % of the "
-      "direct sun (visible share times cosine).{}",
+      "direct sun (visible share times cosine).{}{}",
       s.object, s.material, s.range_m, s.position_m.x, s.position_m.y, s.position_m.z, s.normal.x,
-      s.normal.y, s.normal.z, s.temperature_k, 100.0 * s.sky_frac, 100.0 * s.sun_cosine, clutter);
+      s.normal.y, s.normal.z, s.temperature_k, 100.0 * s.sky_frac, 100.0 * s.sun_cosine, clouds,
+      clutter);
 }
 
 std::string air_sentence(const Explanation& found, const ExplainedBand& band) {
@@ -175,10 +186,12 @@ Json explain_json(const Explanation& found) {
     surface.set("position_m", vector(s.position_m)).set("normal", vector(s.normal));
     surface.set("temperature_k", s.temperature_k).set("sky_frac", s.sky_frac);
     surface.set("sun_cosine", s.sun_cosine);
+    if (found.clouds) surface.set("cloud_sun", s.cloud_sun);
     surface.set("clutter_sd", s.clutter_sd).set("clutter_k", s.clutter_k);
     out.set("surface", surface);
   } else {
     out.set("surface", nullptr);
+    if (found.clouds) out.set("sky_cloud_frac", found.cloud_frac);
   }
   Json bands = Json::array();
   for (const ExplainedBand& band : found.bands) {

@@ -38,6 +38,7 @@ struct ExplainedSurface {
   double sun_cosine = 0.0;  ///< with the visible share of the sun
   double clutter_sd = 0.0;  ///< mean of the clutter's field over the pixel
   double clutter_k = 0.0;   ///< part of temperature_k
+  double cloud_sun = 1.0;   ///< part of sun_cosine: direct sun under clouds by the weather's mean
 };
 
 struct Explanation {
@@ -46,6 +47,8 @@ struct Explanation {
   double time_s = 0.0;
   glm::uvec2 px{0};
   std::optional<ExplainedSurface> surface = std::nullopt;  ///< empty: sky
+  double cloud_frac = 0.0;  ///< opacity of clouds in a pixel of the sky
+  bool clouds = false;      ///< the scenario has [clouds]
   std::vector<ExplainedBand> bands{};
   std::optional<ProbeRun> history = std::nullopt;
   std::vector<double> equilibrium_k{};  ///< by row of the history (Equilibrium); NaN: not known

@@ -162,6 +162,9 @@ struct FrameView {
   std::span<const float> clutter_variance_k2;
   std::array<std::span<const float>, 3> normal;
   std::span<const float> glint_per_sr;
+  /// Broken clouds: of a surface the direct sun by the mean of the weather, 1 without such clouds;
+  /// of the sky the opacity of the clouds in the pixel. Empty unless OutputOptions::terms.
+  std::span<const float> clouds;
   std::span<const float> coverage_frac;  ///< empty unless asked for
   FrameStats stats;
   std::uint8_t quality_level = 0;  ///< quality level that was rendered

@@ -18,6 +18,12 @@ namespace {
 
 using Complex = std::complex<double>;
 
+/// Product of finite numbers. The operator of the library looks for infinities too, which takes
+/// most of the time.
+Complex product(const Complex& a, const Complex& b) noexcept {
+  return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
+}
+
 /// Transforms a row in place, X_k = sum x_n exp(sign 2 pi i n k / N), by Cooley and Tukey's way
 /// (1965). Nothing is scaled. @pre the length is a power of two
 void transform_even(std::span<Complex> row, double sign) {
@@ -39,7 +45,7 @@ void transform_even(std::span<Complex> row, double sign) {
     for (std::size_t first = 0; first < n; first += length) {
       for (std::size_t k = 0; k < length / 2; ++k) {
         const Complex even = row[first + k];
-        const Complex odd = row[first + k + length / 2] * turns[k * stride];
+        const Complex odd = product(row[first + k + length / 2], turns[k * stride]);
         row[first + k] = even + odd;
         row[first + k + length / 2] = even - odd;
       }
@@ -97,7 +103,8 @@ double kept_frac(double waves) noexcept {
 
 }  // namespace
 
-std::vector<FieldLevel> power_law_field(const PowerLaw& law, std::size_t side) {
+std::vector<FieldLevel> power_law_field(const PowerLaw& law, std::size_t side,
+                                        std::size_t most_levels) {
   EMIT_CHECK(std::has_single_bit(side));
   EMIT_CHECK_OP(side, >=, std::size_t{4});
   EMIT_CHECK_OP(side, <=, std::size_t{4096});
@@ -134,6 +141,7 @@ std::vector<FieldLevel> power_law_field(const PowerLaw& law, std::size_t side) {
     sides.push_back(now);
     if (now > 4) sides.push_back(now / 4 * 3);
   }
+  if (sides.size() > most_levels) sides.resize(most_levels);
   for (const std::size_t now : sides) {
     FieldLevel level{.side = now, .variance = 0.0, .values = std::vector<float>(now * now)};
     std::vector<Complex> part(now * now);

@@ -74,7 +74,7 @@ class ShadeTest : public ::testing::Test {
     return environment_.sun_at(now_ns).direction_enu;
   }
   [[nodiscard]] ExposureTiles::Inputs inputs() {
-    return {environment_, entities_, *rays_, workers_, shadow_maps_};
+    return {environment_, entities_, *rays_, workers_, shadow_maps_, glm::dvec3(0.0)};
   }
   /// Runs the tiles as frames do, ten a second.
   void run_to(ExposureTiles& shade, std::int64_t from_ns, std::int64_t until_ns,

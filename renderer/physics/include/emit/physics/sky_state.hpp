@@ -31,6 +31,11 @@ struct SkyState {
 /// @pre air_k > 0
 [[nodiscard]] SkyState sky_state(double longwave_down_w_m2, double air_k, double dew_point_k,
                                  double cloud_frac, const CloudBase& base) noexcept;
+/// Returns the same for a cover that is known and clouds at a stated height: they are as warm as
+/// the irradiance asks for, between the clear sky and the air at the ground, and what is left warms
+/// or cools all of the sky. @pre air_k > 0; cover_frac is 0..1
+[[nodiscard]] SkyState sky_of_cover(double longwave_down_w_m2, double air_k, double dew_point_k,
+                                    double cover_frac, double base_m) noexcept;
 
 /// Mean radiance of the sky as a face sees it, by the tilt of the face: weighted with the cosine to
 /// its normal, over that part of the sky that lies before it (physics.md eq. 44). Node i holds

@@ -38,7 +38,9 @@ struct ClearSky {
   double air_amplitude_k = 6.0;  ///< daily amplitude; the maximum is at 15:00 mean local solar time
   double dew_point_k = 282.0;
   double wind_m_s = 2.0;
-  double cloud_frac = 0.0;
+  double cloud_frac = 0.0;  ///< share of the sky that clouds cover
+  /// Share of the direct sun that passes a cloud; 0 for even clouds (sky/cloud_field.hpp).
+  double cloud_transmission_frac = 0.0;
   std::optional<double> wind_from_rad;  ///< see WeatherSample
   CloudBase cloud_base = {};            ///< of any weather, not only of these models
 };

@@ -11,6 +11,7 @@
 #include "emit/physics/air_film.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/physics/evaporation.hpp"
+#include "emit/reference/cloud_sun.hpp"
 #include "emit/reference/layer_solver.hpp"
 #include "emit/scene/scene_desc.hpp"
 
@@ -71,9 +72,14 @@ class SurfaceClimate {
   /// Returns the climate at any instant. The value after a jump counts if a jump lies at that
   /// instant. Outside the nodes the first or last value holds.
   [[nodiscard]] ClimateNode at(std::int64_t time_ns) const noexcept;
+  /// Returns the broken clouds over the scene; null without any.
+  [[nodiscard]] const CloudSun* clouds() const noexcept { return clouds_.get(); }
+  /// Returns the direct sun at a point of the world by that of `now`, which is a result of at().
+  [[nodiscard]] double cloud_sun(const ClimateNode& now, const glm::dvec3& point_m) const noexcept;
 
  private:
   std::vector<ClimateNode> nodes_;
+  std::shared_ptr<const CloudSun> clouds_;
   std::int64_t history_start_ns_ = 0;
   double reflectance_frac_ = 0.0;
 };

@@ -14,6 +14,7 @@
 #include "emit/physics/climate/surface_water.hpp"
 #include "emit/physics/evaporation.hpp"
 #include "emit/physics/frames.hpp"
+#include "emit/physics/sky/cloud_field.hpp"
 #include "emit/physics/weather.hpp"
 #include "emit/scene/channel_output.hpp"
 #include "emit/scene/clutter_desc.hpp"
@@ -414,6 +415,7 @@ struct ScenarioDesc {
   std::int64_t epoch_utc_ns = 0;       ///< POSIX ns (UTC) of sim time 0
   std::vector<WeatherSample> weather;  ///< empty: clear_sky
   ClearSky clear_sky;
+  std::optional<physics::Clouds> clouds;  ///< absent: clouds have no structure
   AtmosphereDesc atmosphere;
   std::vector<SpectralBand> bands;
   std::vector<Material> materials;  ///< library plus the scenario's own

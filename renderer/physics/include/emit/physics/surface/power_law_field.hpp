@@ -30,8 +30,9 @@ struct FieldLevel {
 /// have random phases, and its values are nearly Gaussian. In all levels but the first a
 /// coefficient of f waves per texel is multiplied by cos^2(pi/2 x) with x = (f - 0.05) / 0.25 held
 /// in 0..1: little is left that bilinear interpolation would turn into ripples, and nothing is
-/// aliased.
+/// aliased. At most the first `most_levels` are made.
 /// @pre `side` is a power of two, 4..4096; two texels <= shortest_m < longest_m <= period_m
-[[nodiscard]] std::vector<FieldLevel> power_law_field(const PowerLaw& law, std::size_t side);
+[[nodiscard]] std::vector<FieldLevel> power_law_field(const PowerLaw& law, std::size_t side,
+                                                      std::size_t most_levels = 64);
 
 }  // namespace emit::physics
