@@ -67,10 +67,9 @@ void InstanceColumns::link_along() {
       if (!(sine > 0.0)) continue;
       const glm::dvec3 middle = 0.5 * (place_m_[a] + place_m_[b]);
       const double opposite_m = std::max(opposite_[a].depth_m, opposite_[b].depth_m);
-      halves.push_back(
-          {std::min(a, b), std::max(a, b),
-           0.5 * glm::dot(to_a, to_b) / sine * glm::distance(place_m_[a], place_m_[b]),
-           std::min(opposite_m, end_below(leaf, 0.5 * (middle + centre)).depth_m)});
+      halves.push_back({std::min(a, b), std::max(a, b),
+                        0.5 * glm::dot(to_a, to_b) / sine * glm::distance(place_m_[a], place_m_[b]),
+                        std::min(opposite_m, end_below(leaf, 0.5 * (middle + centre)).depth_m)});
     }
   }
   std::ranges::stable_sort(halves, {}, [](const Half& h) { return std::pair(h.a, h.b); });
@@ -176,9 +175,9 @@ void InstanceColumns::link_across() {
       const std::uint32_t b = crease.other[e];
       if (column_of_[a] == kNone || column_of_[b] == kNone) continue;
       for (std::size_t l = 0; l < cells(a).count; ++l) {
-        const double area_m2 =
-            share_behind(crease, e, cells(a).top_m[l], cells(a).top_m[l + 1]) * 0.5 * length_m *
-            cells(a).thickness_m(l) * std::sqrt(1.0 + crease.slant * crease.slant);
+        const double area_m2 = share_behind(crease, e, cells(a).top_m[l], cells(a).top_m[l + 1]) *
+                               0.5 * length_m * cells(a).thickness_m(l) *
+                               std::sqrt(1.0 + crease.slant * crease.slant);
         add_across(crease, a, l, b, cells(b).at(cells(a).middle_m(l)), area_m2);
       }
     }

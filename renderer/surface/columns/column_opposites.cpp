@@ -5,8 +5,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "surface/rays/ray_offsets.hpp"
 #include "surface/columns/instance_columns.hpp"
+#include "surface/rays/ray_offsets.hpp"
 
 namespace emit::renderer::columns {
 namespace {
@@ -66,8 +66,7 @@ void InstanceColumns::add_through(std::uint32_t a, std::uint32_t slot, const glm
   const std::uint32_t b = leaf(found)[corner];
   if (column_of_[b] == kNone || opposite_[b].slot == kNone) return;
   const auto to_middle_m2k_w = [&](std::uint32_t v, std::size_t l) {
-    const double share =
-        share_above(cells(v).top_m[l], cells(v).top_m[l + 1], opposite.depth_m);
+    const double share = share_above(cells(v).top_m[l], cells(v).top_m[l + 1], opposite.depth_m);
     return 0.5 * std::max(kLeastShareThrough, share) * cells(v).resistance_m2k_w[l];
   };
   const std::size_t l = cell_above(cells(a), opposite.depth_m);
