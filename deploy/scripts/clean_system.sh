@@ -24,6 +24,8 @@ make_clean_system() {
   fi
   mkdir -p "$1"
   tar -C "$1" -x --zstd -f "$cache"
+  # The folder that debootstrap filled was one of mktemp, which users other than root may not enter.
+  chmod 755 "$1"
   apt_sources >"$1/etc/apt/sources.list"
   # A mirror may be a snapshot, whose lists have expired.
   apt-config dump | grep -E '^Acquire::(Check-Valid-Until|Check-Date|http::Proxy|https::Proxy) ' \

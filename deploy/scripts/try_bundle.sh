@@ -49,14 +49,14 @@ say "without Mesa"
 "$top/bin/emit" doctor >/tmp/doctor 2>&1 && fail "emit doctor finds no failure" || code=$?
 head -n 6 /tmp/doctor
 tail -n 1 /tmp/doctor
-[[ $code == 1 ]] && grep -q "^FAIL .*libEGL.so.1" /tmp/doctor || fail "emit doctor exits with $code"
+[[ $code == 1 ]] && grep -q "^fail .*libEGL.so.1" /tmp/doctor || fail "emit doctor exits with $code"
 "$top/bin/emit" render box --time-s 0 --out /tmp/box.exr && fail "a picture without OpenGL" || echo "emit render exits with $?"
 
 say "with EGL, but neither its dispatch of OpenGL nor a driver"
 apt-get update -q >/dev/null
 apt-get install -q -y --no-install-recommends libegl1 >/tmp/log 2>&1 || { cat /tmp/log; exit 1; }
 "$top/bin/emit" doctor >/tmp/doctor 2>&1 && fail "emit doctor finds no failure" || code=$?
-grep "^FAIL" -A 1 /tmp/doctor || true
+grep "^fail" -A 1 /tmp/doctor || true
 [[ $code == 1 ]] || fail "emit doctor exits with $code"
 
 say "with Mesa"
