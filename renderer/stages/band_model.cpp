@@ -23,6 +23,7 @@ using physics::make_error;
 constexpr std::size_t kMaxTableFloats = 65536;
 static_assert(kMostBands == EMIT_MAX_BANDS);
 static_assert(physics::kSkyTilts == EMIT_SKY_TILTS);
+static_assert(physics::AirView::kElevations == 4 * EMIT_SKY_ELEVATION_VEC4);
 
 /// Radiance of the sky by tilt over that of a blackbody, 1 - tau^m(elevation).
 physics::SkyByTilt sky_frac(double vertical_transmittance_frac) {
@@ -197,6 +198,7 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
   model.turbidity_ = scenario.clear_sky.linke_turbidity;
   model.cloud_base_ = scenario.clear_sky.cloud_base;
   model.clouds_ = scenario.clouds;
+  model.cloud_views_.resize(model.entries_.size());
   // The sky keeps to one dew point over the whole run: the humidity of a weather table does not
   // count.
   model.dew_point_k_ = scene::usual_dew_point_k(scenario);
@@ -264,7 +266,7 @@ BandModel::Instant BandModel::instant_of(const physics::Forcing& forcing,
                                          const physics::SunPosition& sun) const noexcept {
   Instant now;
   now.sky = clouds_ ? physics::sky_of_cover(forcing.longwave_down_w_m2, forcing.air_k, dew_point_k_,
-                                            clouds_->cover_frac, clouds_->base_m)
+                                            clouds_->cover_frac, cloud_base_)
                     : physics::sky_state(forcing.longwave_down_w_m2, forcing.air_k, dew_point_k_,
                                          forcing.cloud_frac, cloud_base_);
   now.air_k = forcing.air_k;
@@ -283,57 +285,6 @@ BandModel::Instant BandModel::instant_of(const physics::Forcing& forcing,
   return now;
 }
 
-double BandModel::warmer_k(const Entry& entry, const Instant& now) const noexcept {
-  // The place's air differs from that of the climate, and the difference fades upwards.
-  return (now.air_k - entry.climate_k) * std::exp(place_m_ / physics::BandAir::kWarmthScaleM);
-}
-
-double BandModel::sky_warmer_k(const Entry& entry, const Instant& now) const noexcept {
-  return warmer_k(entry, now) +
-         now.sky.warmer_k * std::exp(place_m_ / physics::BandAir::kWarmthScaleM);
-}
-
-void BandModel::light_of(const Entry& entry, const Instant& now, BandLight& out) const noexcept {
-  const auto black = [&](double kelvin) {
-    return physics::band_radiance(entry.band, physics::Kelvin(kelvin)).radiance_w_m2_sr;
-  };
-  out.surroundings_w_m2_sr = static_cast<float>(black(now.environment_k));
-  // Take the clear sky and the sun's transmittance from the kind of air that the band has.
-  double sun_transmittance_frac = std::pow(entry.vertical_transmittance_frac, now.air_mass);
-  physics::SkyByTilt clear_w_m2_sr{};
-  if (entry.view) {
-    clear_w_m2_sr = entry.view->clear_sky_by_tilt_w_m2_sr(place_m_, sky_warmer_k(entry, now));
-    sun_transmittance_frac = entry.view->sun_transmittance_frac(place_m_, now.sin_shown);
-    if (entry.view->scatters() && now.beam_frac > 0.0) {
-      const double share = now.beam_frac / (now.distance_au * now.distance_au);
-      const auto scattered = entry.view->scattered_sky_by_tilt_w_m2_sr(place_m_, now.sin_shown);
-      for (std::size_t t = 0; t < physics::kSkyTilts; ++t) clear_w_m2_sr[t] += share * scattered[t];
-    }
-  } else if (entry.air) {
-    clear_w_m2_sr = entry.air_sky_w_m2_sr;
-    sun_transmittance_frac = entry.air->out(now.sin_sun).transmittance_frac;
-  } else {
-    const double sky_air_w_m2_sr = black(now.air_k + now.sky.warmer_k);
-    for (std::size_t t = 0; t < physics::kSkyTilts; ++t) {
-      clear_w_m2_sr[t] = sky_air_w_m2_sr * entry.sky_frac[t];
-    }
-  }
-  // Clouds cover the same share in all directions.
-  const double cover_frac = entry.has_sky ? now.sky.cloud_cover_frac : 0.0;
-  const double clouds_w_m2_sr = cover_frac > 0.0 ? cover_frac * black(now.sky.cloud_k) : 0.0;
-  for (std::size_t t = 0; t < physics::kSkyTilts; ++t) {
-    out.sky_w_m2_sr[t] = static_cast<float>((1.0 - cover_frac) * clear_w_m2_sr[t] + clouds_w_m2_sr);
-  }
-  out.sun_w_m2 = static_cast<float>(entry.sun_outside_w_m2 / (now.distance_au * now.distance_au) *
-                                    now.beam_frac * sun_transmittance_frac);
-}
-
-void BandModel::light_at(const physics::Forcing& forcing, const physics::SunPosition& sun,
-                         std::span<BandLight> out) const noexcept {
-  const Instant now = instant_of(forcing, sun);
-  for (std::size_t i = 0; i < entries_.size(); ++i) light_of(entries_[i], now, out[i]);
-}
-
 double BandModel::shown_beam_frac(const Instant& now, double sensor_m) const noexcept {
   if (sensor_m < place_m_ + now.sky.cloud_base_m) return now.beam_frac;
   if (clouds_) return now.beam_frac * cloud_light_.gain;
@@ -350,9 +301,7 @@ void BandModel::update_scattered(const Entry& entry, const Instant& now, double 
   params_[band].air_sun_first = static_cast<std::uint32_t>(sun_nodes_[band]);
   entry.view->sun_at(sensor_m,
                      {.sin_elevation = now.sin_shown,
-                      .share_frac = beam_frac / (now.distance_au * now.distance_au),
-                      .cloud_cover_frac = even_cover_frac(entry, now),
-                      .cloud_base_m = place_m_ + now.sky.cloud_base_m},
+                      .share_frac = beam_frac / (now.distance_au * now.distance_au)},
                      std::span(air_nodes_).subspan(sun_nodes_[band], physics::AirView::kSunNodes));
 }
 
@@ -373,8 +322,7 @@ void BandModel::update_bodies(const Entry& entry, const Instant& now,
     return std::pow(entry.vertical_transmittance_frac,
                     physics::relative_air_mass(physics::Radians(std::asin(towards.z))));
   };
-  const bool above_clouds = sensor_m >= place_m_ + now.sky.cloud_base_m;
-  const double cover_frac = above_clouds ? 0.0 : even_cover_frac(entry, now);
+  const double cover_frac = even_cover_frac(entry, now, sensor_m);
   const double beam_frac = shown_beam_frac(now, sensor_m);
   const double sine = std::sin(physics::kSunSemiAngleRad);
   params.sun_disc_w_m2_sr =
@@ -396,7 +344,7 @@ void BandModel::update(const physics::Forcing& forcing, const physics::SunPositi
     const Entry& entry = entries_[i];
     gpu::BandParams& params = params_[i];
     BandLight light;
-    light_of(entry, now, light);
+    light_of(i, now, light);
     params.surroundings_radiance_w_m2_sr = light.surroundings_w_m2_sr;
     params.sun_irradiance_w_m2 = light.sun_w_m2;
     for (std::size_t t = 0; t < physics::kSkyTilts; ++t) {
@@ -406,96 +354,17 @@ void BandModel::update(const physics::Forcing& forcing, const physics::SunPositi
     const auto black = [&](double kelvin) {
       return physics::band_radiance(entry.band, physics::Kelvin(kelvin)).radiance_w_m2_sr;
     };
-    const double cover_frac = even_cover_frac(entry, now);
-    const double cloud_w_m2_sr = black(now.sky.cloud_k);
-    params.cloud_base_w_m2_sr = static_cast<float>(entry.has_sky ? cloud_w_m2_sr : 0.0);
     params.air_radiance_w_m2_sr = static_cast<float>(black(now.air_k));
-    params.sky_air_radiance_w_m2_sr =
-        static_cast<float>((1.0 - cover_frac) * black(now.air_k + now.sky.warmer_k));
-    params.cloud_radiance_w_m2_sr = static_cast<float>(cover_frac * cloud_w_m2_sr);
-    params.clear_sky_frac = static_cast<float>(1.0 - cover_frac);
+    params.sky_air_radiance_w_m2_sr = static_cast<float>(black(now.air_k + now.sky.warmer_k));
+    update_clouds(i, now, sensor_m);
     update_bodies(entry, now, moon, sensor_m, params);
     if (lobes_) update_lobe_sky(i, now);
     if (!entry.view) continue;
     entry.view->at(sensor_m,
-                   {.warmer_k = warmer_k(entry, now),
-                    .sky_warmer_k = sky_warmer_k(entry, now),
-                    .cloud_cover_frac = cover_frac,
-                    .cloud_base_m = place_m_ + now.sky.cloud_base_m,
-                    .cloud_radiance_w_m2_sr = cloud_w_m2_sr},
+                   {.warmer_k = warmer_k(entry, now), .sky_warmer_k = sky_warmer_k(entry, now)},
                    std::span(air_nodes_).subspan(params.air_view_first, physics::AirView::kNodes));
-    if (clouds_) {
-      params.cloud_base_w_m2_sr = static_cast<float>(cloud_base_w_m2_sr(i, now, sensor_m));
-    }
     update_scattered(entry, now, sensor_m, i);
   }
-}
-
-double BandModel::cloud_base_w_m2_sr(std::size_t band, const Instant& now,
-                                     double sensor_m) const noexcept {
-  const auto black = [&](double kelvin) {
-    return physics::band_radiance(entries_[band].band, physics::Kelvin(kelvin)).radiance_w_m2_sr;
-  };
-  const double base_m = place_m_ + now.sky.cloud_base_m;
-  if (sensor_m >= base_m) return 0.0;
-  // Average the air before the clouds over the sky of level ground.
-  constexpr int kRings = 16;
-  double through = 0.0;
-  double path = 0.0;
-  for (int i = 0; i < kRings; ++i) {
-    const double sine = (i + 0.5) / kRings;
-    const double weight = 2.0 * sine / kRings;
-    const auto range_m = static_cast<float>(physics::cloud_range_m(base_m - sensor_m, sine));
-    const physics::AirSight sight =
-        physics::air_sight(air_nodes_of(band), static_cast<float>(base_m), range_m);
-    through += weight * static_cast<double>(sight.transmittance_frac[0]);
-    path += weight * static_cast<double>(sight.path_radiance_w_m2_sr);
-  }
-  // Clouds hardly show in air that lets hardly anything through, so that any warmth will do there.
-  constexpr double kColdestK = 200.0;
-  const double warmest_k = std::max(now.air_k, now.sky.cloud_k);
-  return std::clamp((black(now.sky.cloud_k) - path) / std::max(through, 1e-6), black(kColdestK),
-                    black(warmest_k));
-}
-
-double BandModel::cloud_w_m2_sr(std::size_t band, const Seen& seen) const noexcept {
-  const double base_w_m2_sr = params_[band].cloud_base_w_m2_sr;
-  if (!entries_[band].view) return base_w_m2_sr;
-  const auto base_m = static_cast<float>(place_m_ + clouds_->base_m);
-  const auto range_m = static_cast<float>(physics::cloud_range_m(
-      std::max(base_m - seen.sensor_height_m, 1.0F), static_cast<double>(seen.sin_elevation)));
-  const physics::AirSight sight = physics::air_sight(air_nodes_of(band), base_m, range_m);
-  return sight.transmittance_frac[0] * base_w_m2_sr + sight.path_radiance_w_m2_sr;
-}
-
-void BandModel::update_lobe_sky(std::size_t band, const Instant& now) noexcept {
-  const Entry& entry = entries_[band];
-  const auto black = [&](double kelvin) {
-    return physics::band_radiance(entry.band, physics::Kelvin(kelvin)).radiance_w_m2_sr;
-  };
-  const double cover_frac = entry.has_sky ? now.sky.cloud_cover_frac : 0.0;
-  const double clouds_w_m2_sr = cover_frac > 0.0 ? cover_frac * black(now.sky.cloud_k) : 0.0;
-  const double air_w_m2_sr = black(now.air_k + now.sky.warmer_k);
-  const double warmer_k = entry.view ? sky_warmer_k(entry, now) : 0.0;
-  std::array<double, LobeModel::kSkySamples> sky_w_m2_sr{};
-  for (std::size_t s = 0; s < sky_w_m2_sr.size(); ++s) {
-    const double sine = LobeModel::sky_sample_sine(s);
-    double clear_w_m2_sr = 0.0;
-    if (entry.view) {
-      clear_w_m2_sr = entry.view->clear_sky_w_m2_sr(place_m_, warmer_k, sine);
-      if (entry.view->scatters() && now.beam_frac > 0.0) {
-        clear_w_m2_sr += now.beam_frac / (now.distance_au * now.distance_au) *
-                         entry.view->scattered_sky_w_m2_sr(place_m_, now.sin_shown, sine);
-      }
-    } else if (entry.air) {
-      clear_w_m2_sr = entry.air->out(sine).path_radiance_w_m2_sr;
-    } else if (entry.has_sky) {
-      const double mass = physics::relative_air_mass(physics::Radians(std::asin(sine)));
-      clear_w_m2_sr = air_w_m2_sr * (1.0 - std::pow(entry.vertical_transmittance_frac, mass));
-    }
-    sky_w_m2_sr[s] = (1.0 - cover_frac) * clear_w_m2_sr + clouds_w_m2_sr;
-  }
-  lobes_->update_sky(band, sky_w_m2_sr, std::span(air_nodes_).first(LobeModel::kSkyTable));
 }
 
 std::span<const physics::AirView::Node> BandModel::air_nodes_of(std::size_t band) const noexcept {
@@ -507,13 +376,7 @@ double air_transmittance(std::span<const physics::AirView::Node> nodes,
                          const BandModel::Sight& sight, float temperature_k) noexcept {
   const float target_m = sight.sensor_height_m + sight.range_m * sight.sin_elevation;
   const auto node = physics::air_sight_node(nodes, target_m, sight.range_m);
-  // Between 300 K, 800 K and the sun the extinction goes linearly in 1 / T.
-  const float inverse = 1.0F / std::max(temperature_k, 200.0F);
-  const float warm = (1.0F / 300.0F - inverse) / (1.0F / 300.0F - 1.0F / 800.0F);
-  const float hot = (1.0F / 800.0F - inverse) / (1.0F / 800.0F - 1.0F / 5772.0F);
-  const float log_extinction = hot > 0.0F ? std::lerp(node[1], node[2], std::min(hot, 1.0F))
-                                          : std::lerp(node[0], node[1], warm);
-  return std::exp(-std::exp(log_extinction) * sight.range_m);
+  return std::exp(-std::exp(physics::air_log_extinction(node, temperature_k)) * sight.range_m);
 }
 
 BandModel::AirWay BandModel::air_way(std::size_t band, const Sight& sight,
@@ -559,7 +422,6 @@ RadianceTerms BandModel::terms(std::size_t band, const Seen& seen,
   const gpu::BandParams& params = params_[band];
   RadianceTerms out;
   if (!seen.surface) {
-    const float clouds = params.cloud_radiance_w_m2_sr;
     double sun_through_frac = 1.0;
     double moon_through_frac = params.moon_through_frac;
     if (entry.view) {
@@ -574,21 +436,23 @@ RadianceTerms BandModel::terms(std::size_t band, const Seen& seen,
       moon_through_frac *= sky.transmittance_frac[0];
       sun_through_frac = sky.transmittance_frac[2];
     } else if (entry.air) {
-      out.path_w_m2_sr =
-          params.clear_sky_frac * entry.air->out(seen.sin_elevation).path_radiance_w_m2_sr + clouds;
+      out.path_w_m2_sr = entry.air->out(seen.sin_elevation).path_radiance_w_m2_sr;
     } else if (entry.has_sky) {
       const double mass = physics::relative_air_mass(
           physics::Radians(std::asin(std::clamp(seen.sin_elevation, 0.0F, 1.0F))));
       out.path_w_m2_sr = params.sky_air_radiance_w_m2_sr *
-                             (1.0 - std::pow(entry.vertical_transmittance_frac, mass)) +
-                         clouds;
+                         (1.0 - std::pow(entry.vertical_transmittance_frac, mass));
     }
     // Put clouds before the sky, and before sun and moon.
     const double clear_frac = 1.0 - static_cast<double>(seen.cloud_frac);
+    const double cover_frac = clouds_ ? static_cast<double>(seen.cloud_frac)
+                                      : static_cast<double>(params.cloud_cover_frac);
+    if (cover_frac > 0.0) {
+      const float cloud = physics::sky_at_elevation(cloud_views_[band], seen.sin_elevation);
+      out.path_w_m2_sr = (1.0 - cover_frac) * out.path_w_m2_sr + cover_frac * cloud;
+      out.scattered_w_m2_sr *= 1.0 - cover_frac;
+    }
     if (clouds_) {
-      out.path_w_m2_sr =
-          clear_frac * out.path_w_m2_sr + seen.cloud_frac * cloud_w_m2_sr(band, seen);
-      out.scattered_w_m2_sr *= clear_frac;
       const bool above = seen.sensor_height_m >= place_m_ + clouds_->base_m;
       if (!above) sun_through_frac *= cloud_light_.by_mean(seen.cloud_frac);
     }

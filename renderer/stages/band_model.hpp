@@ -178,21 +178,24 @@ class BandModel final : public BandLights {
   /// Sets the sunlight that the air of a band scatters towards the camera.
   void update_scattered(const Entry& entry, const Instant& now, double sensor_m,
                         std::size_t band) noexcept;
-  /// Returns the cover that the picture shows as even: that of clouds with structure is left to the
-  /// pixels.
-  [[nodiscard]] double even_cover_frac(const Entry& entry, const Instant& now) const noexcept {
-    return entry.has_sky && !clouds_ ? now.sky.cloud_cover_frac : 0.0;
+  /// Returns the cover that a camera at a height sees as even: that of clouds with structure is
+  /// left to the pixels, and above their base there are none.
+  [[nodiscard]] double even_cover_frac(const Entry& entry, const Instant& now,
+                                       double sensor_m) const noexcept {
+    const bool below = sensor_m < place_m_ + now.sky.cloud_base_m;
+    return entry.has_sky && !clouds_ && below ? now.sky.cloud_cover_frac : 0.0;
   }
-  /// Returns the radiance of the base of broken clouds in a band for a camera at a height: that of
-  /// clouds whose mean over the sky, with the air before them, is that of now.sky.
-  [[nodiscard]] double cloud_base_w_m2_sr(std::size_t band, const Instant& now,
-                                          double sensor_m) const noexcept;
-  /// Returns the radiance of a cloud in a pixel of the sky, with the air before it.
-  [[nodiscard]] double cloud_w_m2_sr(std::size_t band, const Seen& seen) const noexcept;
+  /// Returns the radiance of clouds in a band by elevation, as it looks from a height below them:
+  /// that of their base, with the air before it (physics.md eq. 84).
+  [[nodiscard]] physics::AirView::ByElevation clouds_by_elevation(std::size_t band,
+                                                                  const Instant& now,
+                                                                  double sensor_m) const noexcept;
+  /// Sets the clouds of a band, even or with structure, as the camera sees them.
+  void update_clouds(std::size_t band, const Instant& now, double sensor_m) noexcept;
   /// Sets the radiance of the discs of sun and moon in a band.
   void update_bodies(const Entry& entry, const Instant& now, const physics::MoonPosition& moon,
                      double sensor_m, gpu::BandParams& params) const noexcept;
-  void light_of(const Entry& entry, const Instant& now, BandLight& out) const noexcept;
+  void light_of(std::size_t band, const Instant& now, BandLight& out) const noexcept;
   /// Sets the sky of a band as lobes see it.
   void update_lobe_sky(std::size_t band, const Instant& now) noexcept;
   std::vector<Entry> entries_;
@@ -208,7 +211,8 @@ class BandModel final : public BandLights {
   double dew_point_k_ = 0.0;
   physics::CloudBase cloud_base_;
   std::optional<physics::Clouds> clouds_;
-  physics::CloudLight cloud_light_;  ///< of the latest update()
+  physics::CloudLight cloud_light_;                         ///< of the latest update()
+  std::vector<physics::AirView::ByElevation> cloud_views_;  ///< by band, as params() has them
   std::uint32_t air_model_ = 0;
   std::uint32_t air_sun_ = 0;
   std::uint32_t air_terms_ = 0;

@@ -9,6 +9,7 @@
 
 #include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
+#include "emit/physics/sky/cloud_field.hpp"
 
 namespace emit::physics {
 namespace {
@@ -71,6 +72,15 @@ ViewCell view_cell(float place, std::size_t nodes) noexcept {
   const float held = place > 0.0F ? std::min(place, last) : 0.0F;
   const auto index = std::min(static_cast<std::size_t>(held), nodes - 2);
   return {index, held - static_cast<float>(index)};
+}
+
+/// Cell of a range on its axis.
+ViewCell range_cell(float range_m) noexcept {
+  static const float kPerRange = static_cast<float>(
+      (AirView::kRanges - 1) / std::log(AirView::kFarthestM / AirView::kNearestM));
+  return view_cell(
+      std::log(std::max(range_m, 1e-3F) / static_cast<float>(AirView::kNearestM)) * kPerRange,
+      AirView::kRanges);
 }
 
 /// Cell of the sky's axis for a sine of the elevation.
@@ -257,18 +267,54 @@ void AirView::at(double sensor_m, const Weather& weather, std::span<Node> out) c
   constexpr std::size_t kSky = kHeights * kRanges;
   const Place place = place_of(sensor_m, weather.warmer_k);
   const Place sky = place_of(sensor_m, weather.sky_warmer_k);
-  for (std::size_t i = 0; i < kNodes; ++i) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const float low = place.low[i].air[k];
-      out[i][k] = low + place.fraction * (place.high[i].air[k] - low);
-    }
-    out[i][3] = radiance_at(i < kSky ? place : sky, i);
+  for (std::size_t i = 0; i < kNodes; ++i) out[i] = node_at(place, i < kSky ? place : sky, i);
+}
+
+AirView::Node AirView::node_at(const Place& place, const Place& radiance,
+                               std::size_t node) noexcept {
+  Node out;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const float low = place.low[node].air[k];
+    out[k] = low + place.fraction * (place.high[node].air[k] - low);
   }
-  // Cover a share of the sky with clouds.
-  if (weather.cloud_base_m <= sensor_m) return;
-  const auto cover = static_cast<float>(weather.cloud_cover_frac);
-  const auto cloud = static_cast<float>(weather.cloud_radiance_w_m2_sr);
-  for (std::size_t i = kSky; i < kNodes; ++i) out[i][3] += cover * (cloud - out[i][3]);
+  out[3] = radiance_at(radiance, node);
+  return out;
+}
+
+double AirView::node_sine(std::size_t node) noexcept {
+  static const std::array<double, kElevations> kSines = [] {
+    std::array<double, kElevations> sines{};
+    for (std::size_t e = 0; e < kElevations; ++e) sines[e] = std::sin(view_elevation_rad(e));
+    return sines;
+  }();
+  return kSines[node];
+}
+
+AirView::ByElevation AirView::layer_w_m2_sr(double sensor_m, double warmer_k,
+                                            const BlackLayer& layer) const noexcept {
+  const Place place = place_of(sensor_m, warmer_k);
+  const auto above_m = std::max(layer.height_m - sensor_m, 1.0);
+  // A ray that would meet the ground is taken at the elevation that just passes it.
+  const double eye_m = std::max(sensor_m, 0.0);
+  const double horizon_sine =
+      -std::sqrt(eye_m * (2.0 * kCloudEarthRadiusM + eye_m)) / (kCloudEarthRadiusM + eye_m);
+  const ViewCell target = view_cell(height_place(static_cast<float>(layer.height_m)), kHeights);
+  ByElevation out;
+  for (std::size_t e = 0; e < kElevations; ++e) {
+    const auto range_m =
+        static_cast<float>(cloud_range_m(above_m, std::max(node_sine(e), horizon_sine)));
+    const ViewCell range = range_cell(range_m);
+    const auto row = [&](std::size_t t) {
+      const std::size_t i = t * kRanges + range.index;
+      return mix_nodes(node_at(place, place, i), node_at(place, place, i + 1), range.fraction);
+    };
+    const Node sight = mix_nodes(row(target.index), row(target.index + 1), target.fraction);
+    const float through =
+        std::exp(-std::exp(air_log_extinction(sight, static_cast<float>(layer.kelvin))) * range_m);
+    out[e] =
+        through * static_cast<float>(layer.radiance_w_m2_sr) + air_path_w_m2_sr(sight, range_m);
+  }
+  return out;
 }
 
 struct AirView::SunPlace {
@@ -305,12 +351,10 @@ AirView::Node AirView::scattered_at(const SunPlace& place, std::size_t node) noe
 void AirView::sun_at(double sensor_m, const Sunlight& sun, std::span<Node> out) const noexcept {
   EMIT_DCHECK(scatters() && out.size() == kSunNodes);
   const SunPlace place = sun_place_of(sensor_m, sun.sin_elevation);
-  // Clouds hide their share of the sky behind them.
-  const double open_frac = sun.cloud_base_m <= sensor_m ? 1.0 : 1.0 - sun.cloud_cover_frac;
+  const auto share = static_cast<float>(sun.share_frac);
   for (std::size_t i = 0; i < kNodes; ++i) {
     out[i] = scattered_at(place, i);
-    const double share = sun.share_frac * (i < kHeights * kRanges ? 1.0 : open_frac);
-    for (float& x : out[i]) x *= static_cast<float>(share);
+    for (float& x : out[i]) x *= share;
   }
   std::copy(phases_.begin(), phases_.end(), out.begin() + kNodes);
 }
@@ -345,17 +389,12 @@ double AirView::scattered_sky_w_m2_sr(double height_m, double sin_sun,
 
 SkyByTilt AirView::scattered_sky_by_tilt_w_m2_sr(double height_m, double sin_sun) const noexcept {
   const SkyShares& shares = sky_shares();
-  static const std::array<double, kElevations> kSines = [] {
-    std::array<double, kElevations> sines{};
-    for (std::size_t e = 0; e < kElevations; ++e) sines[e] = std::sin(view_elevation_rad(e));
-    return sines;
-  }();
   const SunPlace place = sun_place_of(height_m, sin_sun);
   SkyByTilt sum{};
   for (std::size_t e = 0; e < kElevations; ++e) {
     const SkyByTilt& share = shares[e];
     if (share[kSkyTilts - 1] == 0.0 && share[0] == 0.0) continue;
-    const double radiance = scattered_around(place, sin_sun, kSines[e], e);
+    const double radiance = scattered_around(place, sin_sun, node_sine(e), e);
     for (std::size_t t = 0; t < kSkyTilts; ++t) sum[t] += share[t] * radiance;
   }
   return sum;
@@ -395,12 +434,8 @@ double AirView::sun_transmittance_frac(double height_m, double sin_elevation) co
 
 AirView::Node air_sight_node(std::span<const AirView::Node> table, float target_m,
                              float range_m) noexcept {
-  static const float kPerRange = static_cast<float>(
-      (AirView::kRanges - 1) / std::log(AirView::kFarthestM / AirView::kNearestM));
   const ViewCell target = view_cell(height_place(target_m), AirView::kHeights);
-  const ViewCell range = view_cell(
-      std::log(std::max(range_m, 1e-3F) / static_cast<float>(AirView::kNearestM)) * kPerRange,
-      AirView::kRanges);
+  const ViewCell range = range_cell(range_m);
   const auto row = [&](std::size_t t) {
     const std::size_t i = t * AirView::kRanges + range.index;
     return mix_nodes(table[i], table[i + 1], range.fraction);
@@ -420,6 +455,30 @@ AirSight air_sight(std::span<const AirView::Node> table, float target_m, float r
   }
   out.path_radiance_w_m2_sr = air_path_w_m2_sr(node, range_m);
   return out;
+}
+
+SkyByTilt sky_by_tilt_of(const AirView::ByElevation& sky) noexcept {
+  const SkyShares& shares = sky_shares();
+  SkyByTilt sum{};
+  for (std::size_t e = 0; e < AirView::kElevations; ++e) {
+    for (std::size_t t = 0; t < kSkyTilts; ++t) {
+      sum[t] += shares[e][t] * static_cast<double>(sky[e]);
+    }
+  }
+  return sum;
+}
+
+float sky_at_elevation(const AirView::ByElevation& sky, float sin_elevation) noexcept {
+  const ViewCell place = elevation_cell(sin_elevation);
+  return sky[place.index] + place.fraction * (sky[place.index + 1] - sky[place.index]);
+}
+
+float air_log_extinction(const AirView::Node& node, float temperature_k) noexcept {
+  const float inverse = 1.0F / std::max(temperature_k, 200.0F);
+  const float warm = (1.0F / 300.0F - inverse) / (1.0F / 300.0F - 1.0F / 800.0F);
+  const float hot = (1.0F / 800.0F - inverse) / (1.0F / 800.0F - 1.0F / 5772.0F);
+  return hot > 0.0F ? std::lerp(node[1], node[2], std::min(hot, 1.0F))
+                    : std::lerp(node[0], node[1], warm);
 }
 
 AirView::Node air_sky_node(std::span<const AirView::Node> table, float sin_elevation) noexcept {

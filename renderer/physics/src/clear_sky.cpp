@@ -14,7 +14,6 @@ constexpr double kLowestElevationDeg = -2.0;
 
 constexpr double kCloudTerm = 0.784;  // of eq. 12
 constexpr double kCloudLapseKPerM = 0.0065;
-constexpr double kColdestCloudK = 200.0;
 
 }  // namespace
 

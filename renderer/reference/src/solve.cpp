@@ -410,7 +410,7 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
   const physics::SkyState sky_now =
       scenario.clouds
           ? covered_sky_by_bisection(now.longwave_down_w_m2, now.air_k, dew_point_k,
-                                     scenario.clouds->cover_frac, scenario.clouds->base_m)
+                                     scenario.clouds->cover_frac, scenario.clear_sky.cloud_base)
           : sky_by_bisection(now.longwave_down_w_m2, now.air_k, dew_point_k, cloud_frac,
                              scenario.clear_sky.cloud_base);
   const CloudSun* const clouds = climate->clouds();
@@ -477,14 +477,14 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
           static_cast<float>(band.at_aperture(leaving, sensor_m, hit.range_m, hit.direction));
     });
     // Fill the pixels of the sky.
-    if (clouds != nullptr) band.part_clouds(sensor_m);
+    if (clouds != nullptr) band.part_clouds();
     for (std::size_t p = 0; p < sky_rays.size(); ++p) {
       if (sky_rays[p] == glm::dvec3(0.0)) continue;
       double sky = band.sky(sensor_m, sky_rays[p]);
       if (clouds != nullptr) {
         const double opacity =
             clouds->opacity_frac(view.sensor_pose.position_world_m, sky_rays[p], view.sim_time_ns);
-        sky = std::lerp(sky, band.cloud(sensor_m, sky_rays[p]), opacity);
+        sky = std::lerp(sky, band.cloud(sensor_m, sky_rays[p].z), opacity);
       }
       plane[p] = static_cast<float>(sky + discs.radiance_w_m2_sr(band, view, p));
     }

@@ -11,8 +11,8 @@
 
 #include "emit/physics/clear_sky.hpp"
 #include "emit/physics/constants.hpp"
+#include "emit/physics/sky/cloud_field.hpp"
 #include "emit/physics/sky/moon.hpp"
-#include "emit/reference/cloud_sun.hpp"
 
 namespace emit::reference {
 namespace {
@@ -24,6 +24,25 @@ constexpr std::array<double, 5> kAbscissa{0.0130467357414141, 0.0674683166555077
 constexpr std::array<double, 5> kWeight{0.0333356721543441, 0.0747256745752903, 0.1095431812579910,
                                         0.1346333596549982, 0.1477621123573765};
 constexpr double kWidestPanelUm = 1.0;
+
+constexpr std::array<physics::AirSource, 3> kSources{physics::AirSource::black_300k,
+                                                     physics::AirSource::black_800k,
+                                                     physics::AirSource::sun_lowtran};
+
+/// Returns what the air lets through of a source at a temperature: its spectrum lies between those
+/// of kSources, 300 K, 800 K and the sun, by its inverse temperature.
+double thermal_frac(const std::array<double, 3>& tau, double kelvin) {
+  const auto log_depth = [](double t) {
+    return std::log(-std::log(std::clamp(t, 1e-30, 1.0 - 1e-12)));
+  };
+  const double inverse = 1.0 / std::max(kelvin, 200.0);
+  const double warm = (1.0 / 300.0 - inverse) / (1.0 / 300.0 - 1.0 / 800.0);
+  const double hot = (1.0 / 800.0 - inverse) / (1.0 / 800.0 - 1.0 / physics::kSunTemperatureK);
+  const double depth = hot > 0.0
+                           ? std::lerp(log_depth(tau[1]), log_depth(tau[2]), std::min(hot, 1.0))
+                           : std::lerp(log_depth(tau[0]), log_depth(tau[1]), warm);
+  return std::exp(-std::exp(depth));
+}
 
 /// Returns the air mass at a sine of the elevation, at least 0.
 double air_mass(double sin_elevation) {
@@ -95,24 +114,28 @@ physics::SkyState sky_by_bisection(double longwave_down_w_m2, double air_k, doub
       cloud_frac, meet(0.0, 1.0, [&](double n) { return (1.0 - n) * clear + n * under_base; }));
   const double n = sky.cloud_cover_frac;
   const auto sent = [&](double cloud_k) { return (1.0 - n) * clear + n * black(cloud_k); };
-  sky.cloud_k = meet(clear_k, 3.0 * air_k, sent);
+  sky.cloud_k = meet(clear_k, air_k, sent);
   const double warmth = std::pow(std::max(longwave_down_w_m2 / sent(sky.cloud_k), 1e-8), 0.25);
   sky.warmer_k = air_k * (warmth - 1.0);
   // Clouds that send more or less than those of the stated base hang elsewhere.
   sky.cloud_base_m = physics::cloud_base_m(base, air_k);
+  sky.cloud_base_k = physics::cloud_base_k(base, air_k);
   if (!base.height_m && emissivity < 1.0) {
     const double base4 = (black(sky.cloud_k) - clear) / (1.0 - emissivity);
-    const double base_k =
-        std::min(air_k, std::pow(std::max(base4, 0.0) / physics::kStefanBoltzmannWPerM2K4, 0.25));
-    sky.cloud_base_m =
-        std::max(physics::kLowestInferredBaseM, physics::cloud_base_m({.kelvin = base_k}, air_k));
+    sky.cloud_base_k =
+        std::clamp(std::pow(std::max(base4, 0.0) / physics::kStefanBoltzmannWPerM2K4, 0.25),
+                   physics::kColdestCloudK, air_k);
+    sky.cloud_base_m = std::max(physics::kLowestInferredBaseM,
+                                physics::cloud_base_m({.kelvin = sky.cloud_base_k}, air_k));
   }
   sky.cloud_k *= warmth;
+  sky.cloud_base_k *= warmth;
   return sky;
 }
 
 physics::SkyState covered_sky_by_bisection(double longwave_down_w_m2, double air_k,
-                                           double dew_point_k, double cover_frac, double base_m) {
+                                           double dew_point_k, double cover_frac,
+                                           const physics::CloudBase& base) {
   const auto black = [](double kelvin) {
     return physics::kStefanBoltzmannWPerM2K4 * std::pow(kelvin, 4.0);
   };
@@ -132,7 +155,8 @@ physics::SkyState covered_sky_by_bisection(double longwave_down_w_m2, double air
   const double warmth = std::pow(std::max(longwave_down_w_m2 / sent(low_k), 1e-8), 0.25);
   physics::SkyState sky;
   sky.cloud_cover_frac = cover_frac;
-  sky.cloud_base_m = base_m;
+  sky.cloud_base_m = physics::cloud_base_m(base, air_k);
+  sky.cloud_base_k = physics::cloud_base_k(base, air_k) * warmth;
   sky.cloud_k = low_k * warmth;
   sky.warmer_k = air_k * (warmth - 1.0);
   return sky;
@@ -187,7 +211,7 @@ void BandRadiance::set_air(double air_k, const physics::SunPosition& sun, double
   parted_ = false;
   sky_now_ = sky_now;
   sky_air_ = black(air_k + sky_now.warmer_k);
-  cloud_ = black(sky_now.cloud_k);
+  base_ = black(sky_now.cloud_base_k);
   const double sin_sun = std::sin(sun.elevation.value());
   double through = 0.0;
   if (column_) {
@@ -274,24 +298,9 @@ double BandRadiance::at_aperture(const Leaving& leaving, double sensor_m, double
     const double height_m = place_m_ + sensor_m;
     const auto path =
         physics::AirPath::between(*column_, height_m, height_m + range_m * sin_elevation, range_m);
-    const auto seen =
-        air_terms_->evaluate<3, 1>(path,
-                                   {physics::AirSource::black_300k, physics::AirSource::black_800k,
-                                    physics::AirSource::sun_lowtran},
-                                   {warmer_k_});
+    const auto seen = air_terms_->evaluate<3, 1>(path, kSources, {warmer_k_});
     const auto& tau = seen.transmittance_frac;
-    // The spectrum of a surface lies between those of 300 K, 800 K and the sun by its inverse
-    // temperature.
-    const auto log_depth = [](double t) {
-      return std::log(-std::log(std::clamp(t, 1e-30, 1.0 - 1e-12)));
-    };
-    const double inverse = 1.0 / std::max(leaving.surface_k, 200.0);
-    const double warm = (1.0 / 300.0 - inverse) / (1.0 / 300.0 - 1.0 / 800.0);
-    const double hot = (1.0 / 800.0 - inverse) / (1.0 / 800.0 - 1.0 / physics::kSunTemperatureK);
-    const double depth = hot > 0.0
-                             ? std::lerp(log_depth(tau[1]), log_depth(tau[2]), std::min(hot, 1.0))
-                             : std::lerp(log_depth(tau[0]), log_depth(tau[1]), warm);
-    const double thermal = std::exp(-std::exp(depth));
+    const double thermal = thermal_frac(tau, leaving.surface_k);
     double sum =
         thermal * leaving.thermal + tau[2] * leaving.sunlight + seen.path_radiance_w_m2_sr[0];
     if (shine_) {
@@ -331,45 +340,41 @@ double BandRadiance::sky(double sensor_m, double sin_elevation,
     clear_w_m2_sr = air_terms_->path_radiance_w_m2_sr(path, sky_warmer_k_);
     const auto light = scattered(path, sensor_m);
     for (std::size_t k = 0; k < light.size(); ++k) clear_w_m2_sr += light[k] * phase_per_sr[k];
-    if (sensor_m >= sky_now_.cloud_base_m) cover = 0.0;
   } else if (table_) {
     clear_w_m2_sr = table_->out(sin_elevation).path_radiance_w_m2_sr;
   } else {
     clear_w_m2_sr = sky_air_ * (1.0 - std::pow(vertical_frac_, air_mass(sin_elevation)));
   }
-  return (1.0 - cover) * clear_w_m2_sr + cover * cloud_;
+  if (sensor_m >= sky_now_.cloud_base_m) cover = 0.0;
+  return cover > 0.0 ? (1.0 - cover) * clear_w_m2_sr + cover * cloud(sensor_m, sin_elevation)
+                     : clear_w_m2_sr;
 }
 
-void BandRadiance::part_clouds(double sensor_m) {
-  parted_ = true;
-  cloud_base_ = cloud_;
-  if (!column_ || sensor_m >= sky_now_.cloud_base_m) return;
-  // Find the base for which level ground sees as much of the clouds as of an even sky.
-  constexpr int kRings = 180;
-  double through = 0.0;
-  double path = 0.0;
-  for (int i = 0; i < kRings; ++i) {
-    const double elevation = (i + 0.5) / kRings * physics::kPi / 2.0;
-    const double weight = std::sin(2.0 * elevation) * physics::kPi / 2.0 / kRings;
-    const glm::dvec3 direction(std::cos(elevation), 0.0, std::sin(elevation));
-    const auto way =
-        physics::AirPath::between(*column_, place_m_ + sensor_m, place_m_ + sky_now_.cloud_base_m,
-                                  CloudSun::range_m(sky_now_.cloud_base_m - sensor_m, direction));
-    through += weight * air_terms_->transmittance(way, physics::AirSource::black_300k);
-    path += weight * air_terms_->path_radiance_w_m2_sr(way, warmer_k_);
-  }
-  cloud_base_ =
-      std::clamp((cloud_ - path) / std::max(through, 1e-6), black(200.0), std::max(air_, cloud_));
-}
-
-double BandRadiance::cloud(double sensor_m, const glm::dvec3& direction) const {
+double BandRadiance::cloud(double sensor_m, double sin_elevation) const {
   if (!has_air_) return 0.0;
-  if (!column_ || sensor_m >= sky_now_.cloud_base_m) return cloud_;
-  const auto way =
-      physics::AirPath::between(*column_, place_m_ + sensor_m, place_m_ + sky_now_.cloud_base_m,
-                                CloudSun::range_m(sky_now_.cloud_base_m - sensor_m, direction));
-  return air_terms_->transmittance(way, physics::AirSource::black_300k) * cloud_base_ +
-         air_terms_->path_radiance_w_m2_sr(way, warmer_k_);
+  const double above_m = std::max(sky_now_.cloud_base_m - sensor_m, 1.0);
+  // Follow the ray to the base, or from where it just passes the ground.
+  const double eye_m = std::max(place_m_ + sensor_m, 0.0);
+  const double grazing = physics::kCloudEarthRadiusM / (physics::kCloudEarthRadiusM + eye_m);
+  const double sine = std::max(sin_elevation, -std::sqrt(1.0 - grazing * grazing));
+  const double along_m = physics::kCloudEarthRadiusM * sine;
+  const double range_m =
+      std::sqrt(along_m * along_m + above_m * (2.0 * physics::kCloudEarthRadiusM + above_m)) -
+      along_m;
+  if (column_) {
+    const auto seen = air_terms_->evaluate<3, 1>(
+        physics::AirPath::between(*column_, place_m_ + sensor_m, place_m_ + sky_now_.cloud_base_m,
+                                  range_m),
+        kSources, {sky_warmer_k_});
+    return thermal_frac(seen.transmittance_frac, sky_now_.cloud_base_k) * base_ +
+           seen.path_radiance_w_m2_sr[0];
+  }
+  if (table_) {
+    const auto air = table_->along(range_m, sin_elevation);
+    return air.transmittance_frac * base_ + air.path_radiance_w_m2_sr;
+  }
+  const double through = std::pow(vertical_frac_, air_mass(sin_elevation));
+  return through * base_ + (1.0 - through) * sky_air_;
 }
 
 double BandRadiance::to_space(double sensor_m, double sin_elevation,

@@ -44,7 +44,7 @@ class BandIntegral {
 /// temperature of its clouds. The renderer's physics::sky_of_cover() has the closed form.
 [[nodiscard]] physics::SkyState covered_sky_by_bisection(double longwave_down_w_m2, double air_k,
                                                          double dew_point_k, double cover_frac,
-                                                         double base_m);
+                                                         const physics::CloudBase& base);
 
 /// Radiance that leaves a surface and radiance that arrives at the camera, in one band. The stages
 /// are those of the renderer, with the scenario's atmosphere.
@@ -87,11 +87,12 @@ class BandRadiance {
   /// Returns the radiance of the sky in a direction, W m-2 sr-1, from a height above the world's
   /// origin.
   [[nodiscard]] double sky(double sensor_m, const glm::dvec3& direction) const;
-  /// Takes the clouds of sky() apart, for the picture of a camera at a height: what sky_mean() says
-  /// stays. sky() is then that between the clouds.
-  void part_clouds(double sensor_m);
-  /// Returns the radiance of a cloud in a direction, behind the air. @pre part_clouds()
-  [[nodiscard]] double cloud(double sensor_m, const glm::dvec3& direction) const;
+  /// Takes the clouds of sky() apart, for the picture: what sky_mean() says stays. sky() is then
+  /// that between the clouds.
+  void part_clouds() noexcept { parted_ = true; }
+  /// Returns the radiance of a cloud at a sine of the elevation, as it looks from a height above
+  /// the world's origin below its base: that of the base, through the air, and that of the air.
+  [[nodiscard]] double cloud(double sensor_m, double sin_elevation) const;
 
  private:
   explicit BandRadiance(const scene::SpectralBand& band) : integral_(band), name_(band.name) {}
@@ -122,10 +123,9 @@ class BandRadiance {
   double sky_warmer_k_ = 0.0;  ///< the same in the sky
   physics::SkyState sky_now_;
   bool has_air_ = false;
-  double cloud_ = 0.0;       ///< radiance of the clouds, W m-2 sr-1
-  bool parted_ = false;      ///< part_clouds()
-  double cloud_base_ = 0.0;  ///< of parted clouds, before the air
-  double sky_air_ = 0.0;     ///< blackbody as warm as the air of the sky
+  double base_ = 0.0;     ///< radiance of the clouds' base, W m-2 sr-1
+  bool parted_ = false;   ///< part_clouds()
+  double sky_air_ = 0.0;  ///< blackbody as warm as the air of the sky
   double air_ = 0.0;
   static constexpr std::size_t kTiltSteps = 90;
   std::array<double, kTiltSteps + 1> sky_means_{};  ///< by tilt, every 2 degrees

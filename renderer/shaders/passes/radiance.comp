@@ -145,8 +145,7 @@ float air_mass(float sin_elevation) {
 // Band radiance of the sky in W m-2 sr-1, for air that is a sum of exponential terms.
 float sky_radiance_w_m2_sr(uint band, float sin_elevation) {
   float log_vertical = log(max(bands[band].vertical_transmittance_frac, 1e-30));
-  return bands[band].sky_air_radiance_w_m2_sr * (1.0 - exp(log_vertical * air_mass(sin_elevation))) +
-         bands[band].cloud_radiance_w_m2_sr;
+  return bands[band].sky_air_radiance_w_m2_sr * (1.0 - exp(log_vertical * air_mass(sin_elevation)));
 }
 
 // Transmittance of the air over a range, 0..1, as a sum of exponential terms.
@@ -255,16 +254,12 @@ float moon_disc_w_m2_sr(uint band, vec4 sight, vec2 centre, float cover_frac) {
   return cover_frac * through * bands[band].moon_through_frac * sum / weights;
 }
 
-#ifdef EMIT_CLOUDS
-// Radiance of a cloud in a band, `range_m` away. Built-in air lies before it.
-float cloud_w_m2_sr(uint band, float range_m) {
-  float base_w_m2_sr = bands[band].cloud_base_w_m2_sr;
-  if ((EMIT_AIR_MODEL >> band & 1u) == 0u) return base_w_m2_sr;
-  vec4 sight = air_view_node(int(bands[band].air_view_first),
-                             air_view_sight_place(frame.sensor_height_m + clouds.above_m, range_m));
-  return air_view_transmittance(sight.x, range_m) * base_w_m2_sr + air_view_path_w_m2_sr(sight, range_m);
+// Radiance of clouds in a band at a place of the sky, with the air before them.
+float cloud_w_m2_sr(uint band, AirPlace sky) {
+  int node = sky.low - kAirHeights * kAirRanges;
+  return mix(band_uniforms[band].cloud_w_m2_sr[node >> 2][node & 3],
+             band_uniforms[band].cloud_w_m2_sr[(node + 1) >> 2][(node + 1) & 3], sky.along);
 }
-#endif
 
 // Computes and writes all planes of one pixel.
 void write_pixel(ivec2 px) {
@@ -293,7 +288,8 @@ void write_pixel(ivec2 px) {
   float cloud = surface ? 1.0 : 0.0;
 #endif
   // All bands look up their built-in air at one place, whether it lies on a surface or in the sky.
-  AirPlace air_place = air_view_sky_place(sin_elevation);
+  AirPlace sky_place = air_view_sky_place(sin_elevation);
+  AirPlace air_place = sky_place;
   AirPlace sight_place = air_view_sight_place(frame.sensor_height_m + range_m * sin_elevation, range_m);
   if (surface) air_place = sight_place;
 #ifdef EMIT_AIR_SUN
@@ -344,8 +340,7 @@ void write_pixel(ivec2 px) {
     } else if ((EMIT_AIR_TABLE >> i & 1u) != 0u) {
       vec2 air = surface ? atmosphere_table_air(air_table(i), range_m, sin_elevation, clamped)
                          : atmosphere_table_out(air_table(i), sin_elevation, clamped);
-      radiance_w_m2_sr = surface ? air.x * radiance_w_m2_sr + air.y
-                                 : bands[i].clear_sky_frac * air.y + bands[i].cloud_radiance_w_m2_sr;
+      radiance_w_m2_sr = surface ? air.x * radiance_w_m2_sr + air.y : air.y;
     } else if ((EMIT_AIR_TERMS >> i & 1u) != 0u) {
       if (surface) {
         float tau = transmittance(i, range_m);
@@ -354,8 +349,13 @@ void write_pixel(ivec2 px) {
         radiance_w_m2_sr = sky_radiance_w_m2_sr(i, sin_elevation);
       }
     }
+    // Put clouds before the sky.
 #ifdef EMIT_CLOUDS
-    if (!surface) radiance_w_m2_sr = mix(radiance_w_m2_sr, cloud_w_m2_sr(i, cloud_away_m), cloud);
+    if (!surface) radiance_w_m2_sr = mix(radiance_w_m2_sr, cloud_w_m2_sr(i, sky_place), cloud);
+#else
+    if (!surface && bands[i].cloud_cover_frac > 0.0) {
+      radiance_w_m2_sr = mix(radiance_w_m2_sr, cloud_w_m2_sr(i, sky_place), bands[i].cloud_cover_frac);
+    }
 #endif
     if (sun_frac > 0.0) radiance_w_m2_sr += sun_disc_w_m2_sr(i, sight, sun_frac);
     if (moon_frac > 0.0) radiance_w_m2_sr += moon_disc_w_m2_sr(i, sight, moon_centre, moon_frac);

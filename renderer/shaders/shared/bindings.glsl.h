@@ -76,6 +76,7 @@
 #define EMIT_MAX_BANDS 4
 #define EMIT_SKY_TILTS 17  // nodes of the sky by tilt, in EMIT_SKY_TILT_VEC4 vectors
 #define EMIT_SKY_TILT_VEC4 5
+#define EMIT_SKY_ELEVATION_VEC4 12  // vectors that hold the nodes of the sky's elevations (lib/air_view.glsl)
 #define EMIT_MAX_MODES 2
 #define EMIT_MAX_ATMOSPHERE_TERMS 4
 #define EMIT_MAX_TAPS 256

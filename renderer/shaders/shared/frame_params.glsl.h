@@ -177,15 +177,16 @@ struct BandParams {
   uint air_table_ranges;
   uint air_table_elevations;            // 0: the band has no table of the air
   uint air_view_first;                  // index of the first node of the built-in air (lib/air_view.glsl)
-  float sky_air_radiance_w_m2_sr;       // blackbody as warm as the air of the sky, times the clear share
-  float cloud_radiance_w_m2_sr;         // of the clouds, times their cover
-  float clear_sky_frac;                 // share of the sky without clouds
+  float sky_air_radiance_w_m2_sr;       // blackbody as warm as the air of the sky
+  float cloud_cover_frac;               // share of the sky that even clouds cover
+  float unused0;
   uint air_sun_first;                   // index of the first node of the air's scattered sunlight; 0: there is none
   float sun_disc_w_m2_sr;               // radiance of the sun: outside the air if that is built in, else as seen
   float moon_through_frac;              // share of the moon's light that clouds leave, and other air than the built-in one
   float moon_reflected_w_m2_sr;         // sunlight that the moon sends from where the sun stands in the zenith
-  float cloud_base_w_m2_sr;             // broken clouds: radiance of their base, behind air that is built in
+  float unused1;
   vec4 sky_by_tilt_w_m2_sr[EMIT_SKY_TILT_VEC4];  // mean of the sky that a face sees, see lib/sky_tilt.glsl
+  vec4 cloud_w_m2_sr[EMIT_SKY_ELEVATION_VEC4];   // clouds by elevation with the air before them, at its nodes of the sky
 };
 
 // Uniform block of broken clouds (passes/clouds.glsl). Heights and places are those of the layer as it lies in the frame.
@@ -250,7 +251,7 @@ EMIT_SHARED_OFFSET(StepParams, moist_end, 80 * EMIT_MAX_CASCADES + 208);
 EMIT_SHARED_OFFSET(StepParams, air_start_offset_k, 80 * EMIT_MAX_CASCADES + 224);
 EMIT_SHARED_OFFSET(StepParams, cascade_count, 80 * EMIT_MAX_CASCADES + 240);
 static_assert(sizeof(RelaxationParams) == 32);
-static_assert(sizeof(BandParams) == 112 + 16 * EMIT_SKY_TILT_VEC4);
+static_assert(sizeof(BandParams) == 112 + 16 * (EMIT_SKY_TILT_VEC4 + EMIT_SKY_ELEVATION_VEC4));
 EMIT_SHARED_OFFSET(BandParams, air_radiance_w_m2_sr, 32);
 EMIT_SHARED_OFFSET(BandParams, sun_irradiance_w_m2, 48);
 EMIT_SHARED_OFFSET(BandParams, air_table_first, 64);

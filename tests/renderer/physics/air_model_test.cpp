@@ -536,34 +536,18 @@ TEST(AirModel, refuses_what_it_does_not_know) {
   EXPECT_FALSE(air_climate("martian"));
 }
 
-TEST(AirView, clouds_cover_their_share_of_the_sky_below_their_base) {
+TEST(AirView, the_air_of_the_sky_alone_may_be_warmer) {
   const AirColumn column = column_of(AirClimate::midlatitude_summer, 23.0);
   for (const char* name : kBands) {
     const BandAir band = air_of(name);
     const AirView::Subject subject{&band};
     const auto views = AirView::build(column, std::span(&subject, 1));
-    std::vector<AirView::Node> clear(AirView::kNodes);
-    std::vector<AirView::Node> cloudy(AirView::kNodes);
-    AirView::Weather weather{
-        .cloud_cover_frac = 0.6, .cloud_base_m = 900.0, .cloud_radiance_w_m2_sr = 20.0};
-    views[0].at(700.0, {}, clear);
-    views[0].at(700.0, weather, cloudy);
-    for (const double elevation_deg : {0.0, 3.0, 50.0, 90.0}) {
-      const auto sine = static_cast<float>(std::sin(elevation_deg * kDegree));
-      EXPECT_NEAR(air_sky(cloudy, sine).path_radiance_w_m2_sr,
-                  0.4 * air_sky(clear, sine).path_radiance_w_m2_sr + 0.6 * 20.0, 1e-4);
-    }
-    // Lines of sight to targets have no clouds, and a sensor above the clouds sees a clear sky.
-    EXPECT_EQ(cloudy.front(), clear.front());
-    views[0].at(3000.0, {}, clear);
-    views[0].at(3000.0, weather, cloudy);
-    EXPECT_EQ(cloudy, clear);
-    // The air of the sky alone may be warmer.
-    weather = {.warmer_k = 2.0, .sky_warmer_k = 7.0};
-    views[0].at(700.0, {.warmer_k = 7.0, .sky_warmer_k = 7.0}, clear);
-    views[0].at(700.0, weather, cloudy);
-    EXPECT_EQ(cloudy.back(), clear.back());
-    EXPECT_NE(cloudy.front(), clear.front());
+    std::vector<AirView::Node> all(AirView::kNodes);
+    std::vector<AirView::Node> sky(AirView::kNodes);
+    views[0].at(700.0, {.warmer_k = 7.0, .sky_warmer_k = 7.0}, all);
+    views[0].at(700.0, {.warmer_k = 2.0, .sky_warmer_k = 7.0}, sky);
+    EXPECT_EQ(sky.back(), all.back());
+    EXPECT_NE(sky.front(), all.front());
   }
 }
 

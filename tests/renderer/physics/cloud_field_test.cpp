@@ -133,7 +133,7 @@ TEST(CloudField, TheMeanOfTheDirectSunIsThatOfTheWeather) {
 TEST(SkyOfCover, SendsTheIrradianceOfTheWeather) {
   for (const double cover : {0.1, 0.5, 0.9}) {
     for (const double longwave_w_m2 : {220.0, 300.0, 340.0, 420.0}) {
-      const SkyState sky = sky_of_cover(longwave_w_m2, 288.0, 279.0, cover, 1200.0);
+      const SkyState sky = sky_of_cover(longwave_w_m2, 288.0, 279.0, cover, {.height_m = 1200.0});
       const double clear = sky_longwave_w_m2(Kelvin(288.0), Kelvin(279.0), 0.0) *
                            std::pow((288.0 + sky.warmer_k) / 288.0, 4.0);
       const double sum =

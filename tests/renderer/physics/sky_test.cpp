@@ -167,9 +167,20 @@ TEST(SkyState, sends_the_irradiance_that_it_was_made_from) {
         const double cloud_part = kStefanBoltzmannWPerM2K4 * std::pow(sky.cloud_k, 4.0);
         EXPECT_NEAR((1.0 - sky.cloud_cover_frac) * clear_part + sky.cloud_cover_frac * cloud_part,
                     sent, 1e-9 * sent);
-        if (sent > clear) {
+        if (sent > clear && sent < black) {
           EXPECT_NEAR(sky.warmer_k, 0.0, 1e-9);
         }
+        // A base of free height sends what the clouds do, behind the air of eq. 12.
+        const double warmth = 1.0 + sky.warmer_k / 290.0;
+        if (base.height_m) {
+          EXPECT_NEAR(sky.cloud_base_k, cloud_base_k(base, 290.0) * warmth, 1e-9);
+        } else if (sky.cloud_base_k > 1.001 * kColdestCloudK * warmth) {
+          const double base_part =
+              kStefanBoltzmannWPerM2K4 * std::pow(sky.cloud_base_k, 4.0) * (1.0 - clear / black);
+          EXPECT_NEAR(clear * std::pow(warmth, 4.0) + base_part, cloud_part, 1e-9 * cloud_part);
+        }
+        EXPECT_LE(sky.cloud_base_k, 290.0 * warmth + 1e-9);
+        EXPECT_GE(sky.cloud_base_k, kColdestCloudK * warmth - 1e-9);
       }
     }
     for (const double cover : {0.0, 0.3, 1.0}) {

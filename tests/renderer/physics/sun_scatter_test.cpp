@@ -266,27 +266,14 @@ TEST(SunScatter, tables_of_a_view_agree_with_the_model) {
   }
 }
 
-TEST(SunScatter, clouds_hide_their_share_of_the_sky_and_leave_the_path) {
+TEST(SunScatter, a_view_has_light_for_faces_of_every_tilt) {
   const AirColumn column = hazy_column(AirClimate::midlatitude_summer, 23.0);
   const auto scatter = SunScatter::build(column, kMidwave);
   ASSERT_TRUE(scatter);
   const BandAir band = *BandAir::build(kMidwave);
   const AirView::Subject subject{.band = &band, .scatter = &*scatter};
   const auto views = AirView::build(column, std::span(&subject, 1));
-  std::vector<AirView::Node> clear(AirView::kSunNodes);
-  std::vector<AirView::Node> cloudy(AirView::kSunNodes);
-  AirView::Sunlight sun{.sin_elevation = 0.6, .share_frac = 1.0};
-  views[0].sun_at(700.0, sun, clear);
-  sun.cloud_cover_frac = 0.25;
-  sun.cloud_base_m = 1500.0;
-  views[0].sun_at(700.0, sun, cloudy);
-  EXPECT_EQ(air_sight_node(cloudy, 100.0F, 3000.0F), air_sight_node(clear, 100.0F, 3000.0F));
-  EXPECT_NEAR(air_sky_node(cloudy, 0.5F)[0], 0.75F * air_sky_node(clear, 0.5F)[0], 1e-6);
-  views[0].sun_at(1600.0, sun, cloudy);
-  sun.cloud_cover_frac = 0.0;
-  views[0].sun_at(1600.0, sun, clear);
-  EXPECT_EQ(cloudy, clear);
-  // The table is that of any sun: its mean around the sky is what surfaces reflect.
+  // Surfaces reflect its mean around the sky.
   const SkyByTilt around = views[0].scattered_sky_by_tilt_w_m2_sr(700.0, 0.6);
   for (const double each : around) EXPECT_GT(each, 0.0);
   EXPECT_LT(around[0], around[kSkyTilts / 2]);

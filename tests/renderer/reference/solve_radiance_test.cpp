@@ -35,6 +35,7 @@ TEST(ReferenceSky, bisection_finds_the_sky_of_the_closed_form) {
         EXPECT_NEAR(own.cloud_cover_frac, shown.cloud_cover_frac, 1e-9);
         EXPECT_NEAR(own.cloud_k, shown.cloud_k, 1e-6);
         EXPECT_NEAR(own.cloud_base_m, shown.cloud_base_m, 0.1);
+        EXPECT_NEAR(own.cloud_base_k, shown.cloud_base_k, 1e-3);
         EXPECT_NEAR(own.warmer_k, shown.warmer_k, 1e-6);
       }
     }
@@ -71,30 +72,36 @@ TEST(ReferenceSky, agrees_with_the_tables_of_the_renderer_under_clouds) {
     for (const double longwave_w_m2 : {290.0, 350.0, 385.0, 420.0}) {
       const auto sky_now = physics::sky_state(longwave_w_m2, air_k, 280.0, 0.0, {});
       own->set_air(air_k, {}, 0.0, 0.0, sky_now);
-      const double cloud =
-          physics::band_radiance({band.lo_um, band.hi_um, {}}, physics::Kelvin(sky_now.cloud_k))
-              .radiance_w_m2_sr;
+      const physics::AirView::BlackLayer base{
+          .height_m = scenario.place.height_m + sky_now.cloud_base_m,
+          .kelvin = sky_now.cloud_base_k,
+          .radiance_w_m2_sr = physics::band_radiance({band.lo_um, band.hi_um, {}},
+                                                     physics::Kelvin(sky_now.cloud_base_k))
+                                  .radiance_w_m2_sr};
+      const double sky_warmer_k = warmer_k + sky_now.warmer_k * fade;
+      const double cover = sky_now.cloud_cover_frac;
       views[0].at(scenario.place.height_m + 20.0,
-                  {.warmer_k = warmer_k,
-                   .sky_warmer_k = warmer_k + sky_now.warmer_k * fade,
-                   .cloud_cover_frac = sky_now.cloud_cover_frac,
-                   .cloud_base_m = scenario.place.height_m + sky_now.cloud_base_m,
-                   .cloud_radiance_w_m2_sr = cloud},
-                  table);
+                  {.warmer_k = warmer_k, .sky_warmer_k = sky_warmer_k}, table);
+      const auto clouds =
+          views[0].layer_w_m2_sr(scenario.place.height_m + 20.0, sky_warmer_k, base);
       for (const double elevation_deg : {1.0, 5.0, 20.0, 60.0, 90.0}) {
         const double sine = std::sin(elevation_deg * physics::kDegree);
         const double expected =
             own->sky(20.0, {std::sqrt(1.0 - std::min(1.0, sine * sine)), 0.0, sine});
-        EXPECT_NEAR(physics::air_sky(table, static_cast<float>(sine)).path_radiance_w_m2_sr,
-                    expected, 0.02 * expected)
+        const double shown =
+            (1.0 - cover) *
+                physics::air_sky(table, static_cast<float>(sine)).path_radiance_w_m2_sr +
+            cover * physics::sky_at_elevation(clouds, static_cast<float>(sine));
+        EXPECT_NEAR(shown, expected, 0.02 * expected)
             << band.name << ' ' << longwave_w_m2 << ' ' << elevation_deg;
       }
-      const physics::SkyByTilt clear = views[0].clear_sky_by_tilt_w_m2_sr(
-          scenario.place.height_m, warmer_k + sky_now.warmer_k * fade);
+      const physics::SkyByTilt clear =
+          views[0].clear_sky_by_tilt_w_m2_sr(scenario.place.height_m, sky_warmer_k);
+      const physics::SkyByTilt covered = physics::sky_by_tilt_of(
+          views[0].layer_w_m2_sr(scenario.place.height_m, sky_warmer_k, base));
       for (const double normal_up : {1.0, 0.9, 0.5, 0.0, -0.5, -0.9}) {
-        const double mean =
-            (1.0 - sky_now.cloud_cover_frac) * physics::sky_at_tilt(clear, normal_up) +
-            sky_now.cloud_cover_frac * cloud;
+        const double mean = (1.0 - cover) * physics::sky_at_tilt(clear, normal_up) +
+                            cover * physics::sky_at_tilt(covered, normal_up);
         EXPECT_NEAR(mean, own->sky_mean(normal_up), 0.01 * own->sky_mean(normal_up))
             << band.name << ' ' << longwave_w_m2 << ", normal up " << normal_up;
       }

@@ -295,59 +295,101 @@ scene::ScenarioDesc overcast(const scene::SpectralBand& band, double sky_k,
   return scenario;
 }
 
-TEST(RendererAtmosphere, an_overcast_sky_looks_as_warm_as_its_long_wave_irradiance) {
+TEST(RendererAtmosphere, an_overcast_sky_is_its_base_behind_the_air) {
+  const double air_k = 295.0;
+  const double clear_frac =
+      physics::sky_emissivity_frac(physics::Kelvin(physics::usual_dew_point_k(air_k)), 0.0);
+  // A base of no stated height is as warm as eq. 12 says, and where the air cools to that.
+  const auto free_base_k = [&](double sky_k) {
+    return std::pow((std::pow(sky_k, 4.0) - clear_frac * std::pow(air_k, 4.0)) / (1.0 - clear_frac),
+                    0.25);
+  };
   struct Case {
     const char* name;
     double sky_k;
     double cloud_frac;
     physics::CloudBase base;
+    double base_k;
+    double warmer_k = 0.0;
   };
   // A low base; a sky that only clouds can be as warm as; one that eq. 12 would take for partly
   // clear but whose weather states the clouds; and air above that is warmer than at the ground.
-  const double air_k = 295.0;
-  const double dew_k = physics::usual_dew_point_k(air_k);
-  const double low_w_m2 = physics::sky_longwave_w_m2(physics::Kelvin(air_k), physics::Kelvin(dew_k),
-                                                     1.0, {.height_m = 200.0});
-  const std::vector<Case> cases{{"low",
-                                 std::pow(low_w_m2 / physics::kStefanBoltzmannWPerM2K4, 0.25),
-                                 0.0,
-                                 {.height_m = 200.0}},
-                                {"usual", 293.5, 0.0, {}},
-                                {"stated", 288.0, 1.0, {}},
-                                {"inversion", 297.0, 0.0, {}}};
+  const double low_k = air_k - 0.0065 * 200.0;
+  const double low_sky_k =
+      std::pow(clear_frac * std::pow(air_k, 4.0) + (1.0 - clear_frac) * std::pow(low_k, 4.0), 0.25);
+  const std::vector<Case> cases{{"low", low_sky_k, 0.0, {.height_m = 200.0}, low_k},
+                                {"usual", 293.5, 0.0, {}, free_base_k(293.5)},
+                                {"stated", 288.0, 1.0, {}, free_base_k(288.0)},
+                                {"inversion", 297.0, 0.0, {}, 297.0, 2.0}};
   const std::vector<scene::SpectralBand> bands{{"3-5", 3.0, 5.0, {}}, {"8-12", 8.0, 12.0, {}}};
   for (const scene::SpectralBand& band : bands) {
-    const auto black = [&band](double kelvin) {
-      return physics::band_radiance({band.lo_um, band.hi_um, {}}, physics::Kelvin(kelvin))
-          .radiance_w_m2_sr;
+    const physics::Band flat{band.lo_um, band.hi_um, {}};
+    const auto black = [&flat](double kelvin) {
+      return physics::band_radiance(flat, physics::Kelvin(kelvin)).radiance_w_m2_sr;
     };
+    const auto column =
+        physics::AirColumn::build({physics::AirClimate::midlatitude_summer, 23.0, 1.0});
+    const auto air = physics::BandAir::build(flat);
+    ASSERT_TRUE(column && air);
     for (const Case& each : cases) {
       SCOPED_TRACE(band.name + std::string(" ") + each.name);
       auto scenario = overcast(band, each.sky_k, each.base);
       scenario.weather[0].cloud_frac = each.cloud_frac;
-      const auto seen = [&](double up_m) {
-        const glm::dvec3 eye{0.0, -30.0, 4.0};
-        return render(scenario,
-                      {eye, physics::world_from_body_look_at(eye, {0.0, 0.0, 4.0 + up_m})});
+      const double place_m = scenario.place.height_m;
+      const double base_m =
+          each.base.height_m.value_or(std::max((air_k - each.base_k) / 0.0065, 100.0));
+      const double warmer_k = (air_k - column->at(place_m).kelvin + each.warmer_k) *
+                              std::exp(place_m / physics::BandAir::kWarmthScaleM);
+      const auto expected = [&](double above_m, double sine) {
+        constexpr double kEarthM = 6371000.0;
+        const double up_m = base_m - above_m;
+        const double range_m =
+            std::sqrt(std::pow(kEarthM * sine, 2.0) + up_m * (2.0 * kEarthM + up_m)) -
+            kEarthM * sine;
+        const auto way =
+            physics::AirPath::between(*column, place_m + above_m, place_m + base_m, range_m);
+        return air->transmittance(way, physics::AirSource::black_300k) * black(each.base_k) +
+               air->path_radiance_w_m2_sr(way, warmer_k);
       };
-      // Every pixel of the sky is within 1 K of a sky of one temperature.
-      for (const float radiance : seen(30.0).radiance) {
-        ASSERT_GT(radiance, black(each.sky_k - 1.0));
-        ASSERT_LT(radiance, black(each.sky_k + 1.0));
-      }
-      // So is the apparent temperature of the metal that reflects it.
-      const physics::ApparentTemperature apparent({band.lo_um, band.hi_um, {}});
-      const double expected_k =
-          apparent.k(static_cast<float>(0.1 * black(310.0) + 0.9 * black(each.sky_k)));
-      const Frame down = seen(-30.0);
+      const glm::dvec3 eye{0.0, -30.0, 4.0};
+      const physics::ApparentTemperature apparent(flat);
+      const auto pose = [&](double up_m) {
+        return physics::Pose{eye, physics::world_from_body_look_at(eye, {0.0, 0.0, eye.z + up_m})};
+      };
+      const Frame up = render(scenario, pose(30.0));
       double worst_k = 0.0;
+      for (std::uint32_t i = 0; i < up.radiance.size(); i += 37) {
+        ASSERT_TRUE(std::isinf(up.depth_m[i]));
+        const glm::dvec3 ray =
+            world_point(scenario.sensor, pose(30.0), i % 320, i / 320, 1.0) - eye;
+        const double sine = ray.z / glm::length(ray);
+        worst_k = std::max(
+            worst_k,
+            std::abs(static_cast<double>(apparent.k(up.radiance[i]) -
+                                         apparent.k(static_cast<float>(expected(eye.z, sine))))));
+      }
+      EXPECT_LT(worst_k, 0.4);
+      // The metal reflects the mean of that sky. The air before it, of some ten metres, is left
+      // out.
+      double mean = 0.0;
+      for (int i = 0; i < 200; ++i) {
+        const double sine = (i + 0.5) / 200.0;
+        mean += 2.0 * sine / 200.0 * expected(0.0, sine);
+      }
+      const double metal_k = apparent.k(static_cast<float>(0.1 * black(310.0) + 0.9 * mean));
+      const Frame down = render(scenario, pose(-30.0));
+      double metal_worst_k = 0.0;
       for (std::size_t i = 0; i < down.radiance.size(); ++i) {
         ASSERT_FALSE(std::isinf(down.depth_m[i]));
-        worst_k = std::max(worst_k, std::abs(apparent.k(down.radiance[i]) - expected_k));
+        metal_worst_k = std::max(metal_worst_k, std::abs(apparent.k(down.radiance[i]) - metal_k));
       }
-      EXPECT_LT(worst_k, 1.0);
-      RecordProperty(band.name + each.name + std::string("_worst_mk"),
-                     std::to_string(1e3 * worst_k));
+      EXPECT_LT(metal_worst_k, 1.2);
+      std::printf(
+          "%s %s: base %.1f K at %.0f m, overhead %.1f K, long-wave sky %.1f K; off by "
+          "%.2f K, metal by %.2f K\n",
+          band.name.c_str(), each.name, each.base_k, base_m,
+          static_cast<double>(apparent.k(static_cast<float>(expected(0.0, 1.0)))), each.sky_k,
+          worst_k, metal_worst_k);
     }
   }
 }

@@ -51,18 +51,14 @@ class AirView {
   [[nodiscard]] static std::vector<AirView> build(const AirColumn& column,
                                                   std::span<const Subject> subjects);
 
-  /// Air and clouds of an instant.
+  /// Air of an instant.
   struct Weather {
     double warmer_k = 0.0;      ///< air at sea level against that of the climate
     double sky_warmer_k = 0.0;  ///< the same for the sky alone
-    double cloud_cover_frac = 0.0;
-    double cloud_base_m = 0.0;            ///< above sea level
-    double cloud_radiance_w_m2_sr = 0.0;  ///< with the air below them, in band
   };
   /// Writes the table of a sensor at a height above sea level: the lines of sight
-  /// [target height][range], then the sky by elevation. Both differences of the air are clamped to
-  /// +-kMostWarmerK. Clouds cover the same share of the sky in all directions; a sensor above their
-  /// base sees none. RT-safe.
+  /// [target height][range], then the clear sky by elevation. Both differences of the air are
+  /// clamped to +-kMostWarmerK. RT-safe.
   /// @pre out.size() == kNodes
   void at(double sensor_m, const Weather& weather, std::span<Node> out) const noexcept;
   static constexpr double kMostWarmerK = 40.0;
@@ -76,8 +72,6 @@ class AirView {
   struct Sunlight {
     double sin_elevation = 0.0;  ///< apparent
     double share_frac = 0.0;     ///< sunlight below clouds and haze, by a clear sky's at 1 au
-    double cloud_cover_frac = 0.0;
-    double cloud_base_m = 0.0;  ///< above sea level
   };
   /// True if the view knows scattered sunlight.
   [[nodiscard]] bool scatters() const noexcept { return !scattered_.empty(); }
@@ -93,6 +87,22 @@ class AirView {
   /// Returns the same by the tilt of a face. RT-safe after the first call. @pre scatters()
   [[nodiscard]] SkyByTilt scattered_sky_by_tilt_w_m2_sr(double height_m,
                                                         double sin_sun) const noexcept;
+
+  /// Radiance or shares of the sky by elevation, at the nodes of the sky's axis.
+  using ByElevation = std::array<float, kElevations>;
+  /// Returns the sine of the elevation at a node of the sky. RT-safe after the first call.
+  [[nodiscard]] static double node_sine(std::size_t node) noexcept;
+  /// Black level layer, such as the base of clouds.
+  struct BlackLayer {
+    double height_m = 0.0;        ///< above sea level
+    double kelvin = 0.0;          ///< by which the air takes its light
+    double radiance_w_m2_sr = 0;  ///< of the layer itself, in band
+  };
+  /// Returns the radiance of a layer above a sensor by elevation, with the air before it, over a
+  /// round Earth (physics.md eq. 84). Rays below the horizon are those that just pass the ground.
+  /// `warmer_k` is that of Weather. RT-safe after the first call.
+  [[nodiscard]] ByElevation layer_w_m2_sr(double sensor_m, double warmer_k,
+                                          const BlackLayer& layer) const noexcept;
 
   /// Returns the clear sky's radiance by the tilt of a face at a height, W m-2 sr-1. RT-safe after
   /// the first call.
@@ -115,6 +125,8 @@ class AirView {
   struct Place;
   [[nodiscard]] Place place_of(double sensor_m, double warmer_k) const noexcept;
   [[nodiscard]] static float radiance_at(const Place& place, std::size_t node) noexcept;
+  [[nodiscard]] static Node node_at(const Place& place, const Place& radiance,
+                                    std::size_t node) noexcept;
   /// Place of a sensor height and of a sun on the slices of scattered sunlight.
   struct SunPlace;
   [[nodiscard]] SunPlace sun_place_of(double sensor_m, double sin_sun) const noexcept;
@@ -126,6 +138,14 @@ class AirView {
   std::vector<Node> scattered_;  ///< at 1 au, [sun][sensor][node]
   std::vector<Node> phases_;     ///< phase functions, or empty
 };
+
+/// Returns the sky by the tilt of a face from its nodes. RT-safe after the first call.
+[[nodiscard]] SkyByTilt sky_by_tilt_of(const AirView::ByElevation& sky) noexcept;
+/// Returns the sky in a direction from its nodes, in float32 as the shader does. RT-safe.
+[[nodiscard]] float sky_at_elevation(const AirView::ByElevation& sky, float sin_elevation) noexcept;
+/// Returns the logarithm of the mean extinction, m-1, for what a source of a temperature emits,
+/// from the node of a line of sight: linear in 1/T between 300 K, 800 K and the sun. RT-safe.
+[[nodiscard]] float air_log_extinction(const AirView::Node& node, float temperature_k) noexcept;
 
 /// Air between a sensor and a point, from a table.
 struct AirSight {

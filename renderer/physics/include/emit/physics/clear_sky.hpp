@@ -55,6 +55,8 @@ struct CloudBase {
 /// Clouds whose base follows from an irradiance are at least that high above the ground, so that a
 /// camera that stands on it is below them.
 inline constexpr double kLowestInferredBaseM = 100.0;
+/// No base is colder, unless its temperature is stated.
+inline constexpr double kColdestCloudK = 200.0;
 
 /// Returns the emissivity of the sky, at most 1, physics.md eq. 12: the Berdahl-Martin form as
 /// recalibrated by Li et al. (2017), plus the cloud term 0.784 (1 - e) n, for clouds with a base of

@@ -18,7 +18,9 @@ namespace emit::physics {
 struct SkyState {
   double cloud_cover_frac = 0.0;  ///< 0..1, the same in all directions
   double cloud_base_m = 0.0;      ///< height of the clouds' base above the ground
-  double cloud_k = 0.0;           ///< temperature of the clouds with the air below them
+  double cloud_k =
+      0.0;  ///< temperature of the clouds with the air below them, over all wavelengths
+  double cloud_base_k = 0.0;  ///< temperature of the clouds' base itself
   /// The air of the clear share emits as if it were that much warmer than the weather's at the
   /// ground.
   double warmer_k = 0.0;
@@ -26,16 +28,18 @@ struct SkyState {
 
 /// Returns the sky whose long-wave irradiance on level ground is `longwave_down_w_m2` above air of
 /// `air_k`. The cover lies between a clear sky (eq. 12 for the dew point) and an overcast one, and
-/// is at least `cloud_frac`. Above an overcast sky's irradiance the clouds are warmer; below a
-/// clear one's all of the sky is colder. The irradiance is at least 0.
-/// @pre air_k > 0
+/// is at least `cloud_frac`. Above an overcast sky's irradiance the clouds are warmer, up to the
+/// air at the ground, then all of the sky; below a clear one's all of the sky is colder. A base of
+/// a stated height keeps its temperature; otherwise it is as high and as warm as eq. 12 says. The
+/// irradiance is at least 0. @pre air_k > 0
 [[nodiscard]] SkyState sky_state(double longwave_down_w_m2, double air_k, double dew_point_k,
                                  double cloud_frac, const CloudBase& base) noexcept;
-/// Returns the same for a cover that is known and clouds at a stated height: they are as warm as
-/// the irradiance asks for, between the clear sky and the air at the ground, and what is left warms
-/// or cools all of the sky. @pre air_k > 0; cover_frac is 0..1
+/// Returns the same for a cover that is known and clouds at a stated height: over all wavelengths
+/// they look as warm as the irradiance asks for, between the clear sky and the air at the ground,
+/// and what is left warms or cools all of the sky. @pre air_k > 0; cover_frac is 0..1;
+/// base.height_m
 [[nodiscard]] SkyState sky_of_cover(double longwave_down_w_m2, double air_k, double dew_point_k,
-                                    double cover_frac, double base_m) noexcept;
+                                    double cover_frac, const CloudBase& base) noexcept;
 
 /// Mean radiance of the sky as a face sees it, by the tilt of the face: weighted with the cosine to
 /// its normal, over that part of the sky that lies before it (physics.md eq. 44). Node i holds
