@@ -18,6 +18,7 @@ block-on-road  12600  320 256 all
 box            12600  320 240 all
 decoys         2.6    320 256 all
 engage         4      320 256 all
+fair-weather   12600  320 256 day,dusk
 ribbed         7200   320 256 all weather.file=
 sea            0      320 256 all
 statue         12600  320 240 day,dusk
