@@ -97,6 +97,14 @@ void fit_changes(HistoryInterval& interval, const Environment& environment) noex
 
 }  // namespace
 
+StateTexels texels_of(const FosterState<double>& x) noexcept {
+  StateTexels texels{};
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    texels[i / 4][static_cast<glm::length_t>(i % 4)] = static_cast<float>(x[i]);
+  }
+  return texels;
+}
+
 FosterState<double> foster_initial_states(const FosterMaterial& material) noexcept {
   FosterState<double> x{};
   const double flux_w_m2 =
@@ -351,11 +359,16 @@ FosterState<double> FosterHistory::start_states(std::size_t material,
   const glm::dvec2 weight = place - low;
   const std::size_t at = (material * grid_nodes_ + static_cast<std::size_t>(low.y)) * grid_nodes_ +
                          static_cast<std::size_t>(low.x);
-  const glm::dvec4 south = glm::mix(glm::dvec4(table_[at]), glm::dvec4(table_[at + 1]), weight.x);
-  const glm::dvec4 north = glm::mix(glm::dvec4(table_[at + grid_nodes_]),
-                                    glm::dvec4(table_[at + grid_nodes_ + 1]), weight.x);
-  const glm::dvec4 x = glm::mix(south, north, weight.y);
-  return {x.x, x.y, x.z, x.w};
+  FosterState<double> x{};
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const auto state = [&](std::size_t node) {
+      return static_cast<double>(table_[node][i / 4][static_cast<glm::length_t>(i % 4)]);
+    };
+    const double south = glm::mix(state(at), state(at + 1), weight.x);
+    const double north = glm::mix(state(at + grid_nodes_), state(at + grid_nodes_ + 1), weight.x);
+    x[i] = glm::mix(south, north, weight.y);
+  }
+  return x;
 }
 
 IntervalForcing FosterHistory::extend(std::int64_t begin_ns, std::int64_t end_ns,
@@ -405,8 +418,7 @@ void FosterHistory::spin_up(const Environment& environment, const Loop& each) {
     for (std::uint32_t i = 0; i < grid_nodes_; ++i) {
       const FosterState<double> x =
           spun_up(m, unit_from_octahedral(scale * i - 1.0, scale * static_cast<double>(j) - 1.0));
-      table_[row * grid_nodes_ + i] = glm::vec4(static_cast<float>(x[0]), static_cast<float>(x[1]),
-                                                static_cast<float>(x[2]), static_cast<float>(x[3]));
+      table_[row * grid_nodes_ + i] = texels_of(x);
     }
   });
   revision_ = environment.revision();

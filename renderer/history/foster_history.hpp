@@ -38,6 +38,11 @@ namespace emit::renderer {
                                                             double reference_k,
                                                             double offset_k) noexcept;
 
+/// A number for each mode as shaders read it: in texels of four floats, with zeros at the end.
+using StateTexels = std::array<glm::vec4, (physics::kMaxFosterModes + 3) / 4>;
+/// Returns numbers of the modes as texels. RT-safe.
+[[nodiscard]] StateTexels texels_of(const physics::FosterState<double>& x) noexcept;
+
 /// Returns the states of a steady profile between the surface's first temperature and the base.
 /// RT-safe.
 [[nodiscard]] physics::FosterState<double> foster_initial_states(
@@ -94,7 +99,7 @@ class FosterHistory {
   /// Returns the table of states by material, row and column of the grid. Node (i, j) of a grid of
   /// m nodes per axis is the direction of octahedral coordinates (2 i / (m - 1) - 1, 2 j / (m - 1)
   /// - 1).
-  [[nodiscard]] std::span<const glm::vec4> table() const noexcept { return table_; }
+  [[nodiscard]] std::span<const StateTexels> table() const noexcept { return table_; }
   [[nodiscard]] std::uint32_t grid_nodes() const noexcept { return grid_nodes_; }
 
   /// Returns states from the table by bilinear interpolation. Thread: any. RT-safe.
@@ -156,7 +161,7 @@ class FosterHistory {
   std::vector<IntervalForcing> tail_;
   std::vector<IntervalForcing> intervals_;
   std::vector<std::int64_t> nodes_ns_;
-  std::vector<glm::vec4> table_;
+  std::vector<StateTexels> table_;
 
   std::uint64_t revision_ = 0;
   bool weather_before_start_ = false;

@@ -34,7 +34,9 @@ physics::Result<RadiancePass> RadiancePass::create(const scene::ThermalOptions& 
   if (content.clutter) defines.push_back({"EMIT_CLUTTER", "1"});
   if (content.clutter_emissivity) defines.push_back({"EMIT_CLUTTER_EMISSIVITY", "1"});
   if (content.clouds) defines.push_back({"EMIT_CLOUDS", "1"});
-  if (options.model == scene::ThermalModel::foster) defines.push_back({"EMIT_FOSTER", "1"});
+  if (options.model == scene::ThermalModel::foster) {
+    defines.push_back({"EMIT_FOSTER_GROUPS", fmt::format("{}", content.foster_groups)});
+  }
   if (options.method == scene::ThermalMethod::cached) defines.push_back({"EMIT_CACHED", "1"});
   auto program = gl::Program::compute("passes/radiance.comp", defines);
   if (!program) return tl::unexpected(std::move(program.error()));

@@ -12,12 +12,14 @@
 namespace emit::renderer {
 
 physics::Result<ThermalPass> ThermalPass::create(std::uint32_t width_px, std::uint32_t height_px,
-                                                 const scene::ThermalOptions& options) {
+                                                 const scene::ThermalOptions& options,
+                                                 std::uint32_t foster_groups) {
   ThermalPass pass;
   // Compile the step of the thermal model.
   std::vector<gl::Define> defines = {
       {"EMIT_BLOCKER_TAPS", fmt::format("{}u", options.blocker_taps)},
-      {"EMIT_FILTER_TAPS", fmt::format("{}u", options.filter_taps)}};
+      {"EMIT_FILTER_TAPS", fmt::format("{}u", options.filter_taps)},
+      {"EMIT_FOSTER_GROUPS", fmt::format("{}", foster_groups)}};
   const bool foster = options.model == scene::ThermalModel::foster;
   auto step_program =
       gl::Program::compute(foster ? "passes/thermal_foster.comp" : "passes/thermal.comp", defines);
@@ -29,7 +31,8 @@ physics::Result<ThermalPass> ThermalPass::create(std::uint32_t width_px, std::ui
   pass.step_program_ = std::move(*step_program);
   pass.sun_program_ = std::move(*sun_program);
   if (foster) pass.state_format_ = GL_RGBA32F;
-  pass.state_ = image_texture(pass.state_format_, width_px, height_px);
+  pass.state_ =
+      image_texture(pass.state_format_, width_px, foster ? height_px * foster_groups : height_px);
   pass.sun_now_ = image_texture(GL_R32F, width_px, height_px);
   return pass;
 }

@@ -17,10 +17,12 @@ namespace emit::renderer {
 class ThermalPass {
  public:
   /// Compiles the pass for images of up to `width_px` x `height_px` and for the thermal model and
-  /// the numbers of taps in `options`. Errors: gpu (names the shader).
+  /// the numbers of taps in `options`. `foster_groups` is the number of texels that hold the modes
+  /// of a pixel with foster, 1 or 2. Errors: gpu (names the shader).
   [[nodiscard]] static physics::Result<ThermalPass> create(std::uint32_t width_px,
                                                            std::uint32_t height_px,
-                                                           const scene::ThermalOptions& options);
+                                                           const scene::ThermalOptions& options,
+                                                           std::uint32_t foster_groups);
   /// Advances every visible point over the interval that is bound as EMIT_BIND_STEP. The window of
   /// the frame has `size_px` pixels.
   void dispatch_step(const glm::uvec2& size_px) const noexcept;
@@ -35,7 +37,9 @@ class ThermalPass {
 
   gl::Program step_program_;
   gl::Program sun_program_;
-  gl::Texture state_;  ///< temperature offsets of two modes (foster: four), K
+  /// Temperature offsets of two modes, K. With foster of four, and those of all further modes lie
+  /// in as many rows below.
+  gl::Texture state_;
   GLenum state_format_ = GL_RG32F;
   gl::Texture sun_now_;  ///< R32F: visible share of the sun's disc at the instant of the frame
 };

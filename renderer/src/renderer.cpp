@@ -38,6 +38,7 @@
 #include "stages/cached_stage.hpp"
 #include "stages/cloud_layer.hpp"
 #include "stages/clutter_fields.hpp"
+#include "stages/foster_params.hpp"
 #include "stages/frame_setup.hpp"
 #include "stages/gas_model.hpp"
 #include "stages/per_frame_stage.hpp"
@@ -853,9 +854,9 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
                                            .clutter = !clutter->empty()};
   auto geometry_pass = GeometryPass::create(*context, geometry_setup);
   if (!geometry_pass) return tl::unexpected(std::move(geometry_pass.error()));
-  auto radiance_pass = RadiancePass::create(
-      scenario.thermal, radiance_content(*bands, *clutter, scenario.clouds.has_value(), output),
-      context->software());
+  RadianceContent content = radiance_content(*bands, *clutter, scenario.clouds.has_value(), output);
+  content.foster_groups = foster_groups(*foster);
+  auto radiance_pass = RadiancePass::create(scenario.thermal, content, context->software());
   if (!radiance_pass) return tl::unexpected(std::move(radiance_pass.error()));
   FramePasses passes{std::move(*geometry_pass), std::move(*radiance_pass), {}, {}, {}};
   std::optional<GasModel> gas;

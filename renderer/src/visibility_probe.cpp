@@ -176,7 +176,7 @@ Result<std::unique_ptr<VisibilityProbe>> VisibilityProbe::create(
   if (!occlusion) return tl::unexpected(std::move(occlusion.error()));
   auto shadow = ShadowPass::create(thermal.shadow_map_px, thermal.max_cascades);
   if (!shadow) return tl::unexpected(std::move(shadow.error()));
-  auto shade = ThermalPass::create(sensor.width_px, sensor.height_px, thermal);
+  auto shade = ThermalPass::create(sensor.width_px, sensor.height_px, thermal, 1);
   if (!shade) return tl::unexpected(std::move(shade.error()));
   return std::make_unique<GlProbe>(sensor, thermal, std::move(*context), std::move(*geometry),
                                    std::move(*occlusion), std::move(*shadow), std::move(*shade));

@@ -11,6 +11,10 @@
 /// scenario uses the published model.
 namespace emit::renderer {
 
+/// Returns how many texels of four numbers the shaders need for the states of a pixel: 1 where no
+/// material has more than kFewFosterModes modes, else EMIT_FOSTER_TEXELS.
+[[nodiscard]] std::uint32_t foster_groups(std::span<const FosterMaterial> materials) noexcept;
+
 /// Writes the resistances of the modes into the material table. RT-safe.
 /// @pre The extended model has at least as many materials as `params`.
 void add_resistances(const std::optional<FosterHistory>& foster,

@@ -223,17 +223,16 @@ void set_foster_gains(const IntervalForcing& forcing, std::span<const FosterMate
   static_assert(EMIT_FOSTER_LEVELS == physics::kMaxFosterLevel);
   EMIT_CHECK_OP(forcing.dt_s, >=, 0.0);
   EMIT_CHECK_OP(params.size(), ==, materials.size() * EMIT_FOSTER_ENTRIES);
-  const auto narrow = [](const physics::FosterState<double>& x) {
-    return glm::vec4(static_cast<float>(x[0]), static_cast<float>(x[1]), static_cast<float>(x[2]),
-                     static_cast<float>(x[3]));
-  };
   for (std::size_t m = 0; m < materials.size(); ++m) {
     // Compute the gains of all splits of one material.
     const physics::FosterLadder ladder = physics::foster_ladder(forcing.dt_s, materials[m].network);
     const auto entries = params.subspan(m * EMIT_FOSTER_ENTRIES, EMIT_FOSTER_ENTRIES);
     for (std::size_t level = 0; level < ladder.level.size(); ++level) {
-      entries[level] = {narrow(ladder.level[level].start_frac),
-                        narrow(ladder.level[level].end_frac)};
+      const StateTexels start = texels_of(ladder.level[level].start_frac);
+      const StateTexels end = texels_of(ladder.level[level].end_frac);
+      for (std::size_t texel = 0; texel < start.size(); ++texel) {
+        entries[level * EMIT_FOSTER_TEXELS + texel] = {start[texel], end[texel]};
+      }
     }
     const int slot = materials[m].water_slot;
     const auto wet = [slot](const SurfaceForcing& f) {

@@ -70,7 +70,8 @@ physics::Result<std::unique_ptr<ThermalStage>> PerFrameStage::create(
   if (!occlusion) return tl::unexpected(std::move(occlusion.error()));
   auto shadow = ShadowPass::create(scenario.thermal.shadow_map_px, scenario.thermal.max_cascades);
   if (!shadow) return tl::unexpected(std::move(shadow.error()));
-  auto thermal = ThermalPass::create(width_px, height_px, scenario.thermal);
+  auto thermal =
+      ThermalPass::create(width_px, height_px, scenario.thermal, foster_groups(foster_materials));
   if (!thermal) return tl::unexpected(std::move(thermal.error()));
   return std::unique_ptr<ThermalStage>(
       new PerFrameStage(scenario, std::move(geometry), std::move(foster_materials), history,

@@ -138,7 +138,7 @@ Key<Material> relaxation_modes_key() {
 
 Key<Material> foster_modes_key() {
   return custom<Material>(
-      {"foster_modes", "array of tables", "", "1 .. 4, resistances add up to that of the layers",
+      {"foster_modes", "array of tables", "", "1 .. 6, resistances add up to that of the layers",
        "foster: modes, fastest first, as `emit fit` writes them. Without them they are derived "
        "from the layers. See `foster_modes` below.",
        false},
@@ -151,7 +151,7 @@ Key<Material> foster_modes_key() {
         }
         if (out.foster_modes.empty() || out.foster_modes.size() > physics::kMaxFosterModes) {
           diagnostics.add(node.at, "'foster_modes' has " + std::to_string(out.foster_modes.size()) +
-                                       " entries, must have 1 to 4");
+                                       " entries, must have 1 to 6");
           return;
         }
         for (std::size_t i = 1; i < out.foster_modes.size(); ++i) {

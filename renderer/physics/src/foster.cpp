@@ -74,6 +74,7 @@ FosterSurface<double> foster_surface(const FosterNetwork& network, double emissi
 
 FosterLadder foster_ladder(double dt_s, const FosterNetwork& network) noexcept {
   FosterLadder ladder;
+  ladder.modes = network.count;
   // Compute the finest level and double it up to the whole interval.
   ladder.level[kMaxFosterLevel] =
       foster_gains(dt_s / static_cast<double>(1 << kMaxFosterLevel), network);
@@ -88,7 +89,7 @@ namespace {
 
 /// Advances as foster_advance() does. `gains_at(level)` returns the gains of a level. Lanes that
 /// have converged keep their result while others go on.
-template <class Real, class GainsAt>
+template <std::size_t kModes, class Real, class GainsAt>
 FosterAdvance advance_controlled(FosterState<Real>& x, const FosterDrive<Real>& begin,
                                  const FosterDrive<Real>& end, const GainsAt& gains_at,
                                  const FosterSurface<Real>& surface, double tolerance_k) noexcept {
@@ -96,7 +97,7 @@ FosterAdvance advance_controlled(FosterState<Real>& x, const FosterDrive<Real>& 
   FosterAdvance result;
   // Start with one step, then halve the steps until the result stops moving.
   const FosterState<Real> start = x;
-  Mask<Real> clamped = foster_step(x, begin, end, gains_at(0), surface);
+  Mask<Real> clamped = foster_step<kModes>(x, begin, end, gains_at(0), surface);
   Mask<Real> moves = Mask<Real>(true);
   for (int level = 1; level <= kMaxFosterLevel; ++level) {
     const FosterGains<Real> gains = gains_at(static_cast<std::size_t>(level));
@@ -106,13 +107,14 @@ FosterAdvance advance_controlled(FosterState<Real>& x, const FosterDrive<Real>& 
     for (int i = 1; i <= steps; ++i) {
       const FosterDrive<Real> to =
           i == steps ? end : lerp(begin, end, Real(static_cast<double>(i) / steps));
-      clamped = either(foster_step(fine, from, to, gains, surface), clamped);
+      clamped = either(foster_step<kModes>(fine, from, to, gains, surface), clamped);
       from = to;
     }
     // Compare with the coarser result. Step doubling of a second-order scheme leaves a third of the
     // change as error.
-    Real change_k = abs(foster_offset_k(fine, surface) - foster_offset_k(x, surface));
-    for (std::size_t i = 0; i < kMaxFosterModes; ++i) {
+    Real change_k =
+        abs(foster_offset_k<kModes>(fine, surface) - foster_offset_k<kModes>(x, surface));
+    for (std::size_t i = 0; i < kModes; ++i) {
       const Real mode_k = abs(fine[i] - x[i]);
       change_k = choose(Mask<Real>(change_k < mode_k), mode_k, change_k);
       x[i] = choose(moves, fine[i], x[i]);
@@ -130,8 +132,8 @@ FosterAdvance advance_controlled(FosterState<Real>& x, const FosterDrive<Real>& 
 
 static_assert(kFosterLanes == kWideLanes);
 
-/// Advances as many surfaces as there are lanes.
-template <class Lanes>
+/// Advances as many surfaces as there are lanes. None of them has more than `kModes` modes.
+template <class Lanes, std::size_t kModes>
 [[gnu::always_inline]] inline void advance_lanes(
     const std::array<const FosterLane*, kFosterLanes>& lanes, double tolerance_k) noexcept {
   // Takes one value a lane; `value` takes the number of the lane.
@@ -155,14 +157,14 @@ template <class Lanes>
   surface.base_offset_k = gathered([&](std::size_t l) { return lanes[l]->surface.base_offset_k; });
   surface.reference_k = gathered([&](std::size_t l) { return lanes[l]->surface.reference_k; });
   FosterState<Lanes> x;
-  for (std::size_t i = 0; i < kMaxFosterModes; ++i) {
+  for (std::size_t i = 0; i < kModes; ++i) {
     surface.resistance_m2k_w[i] =
         gathered([&](std::size_t l) { return lanes[l]->surface.resistance_m2k_w[i]; });
     x[i] = gathered([&](std::size_t l) { return (*lanes[l]->x)[i]; });
   }
   const auto gains_at = [&](std::size_t level) {
     FosterGains<Lanes> gains;
-    for (std::size_t i = 0; i < kMaxFosterModes; ++i) {
+    for (std::size_t i = 0; i < kModes; ++i) {
       gains.start_frac[i] =
           gathered([&](std::size_t l) { return lanes[l]->ladder->level[level].start_frac[i]; });
       gains.end_frac[i] =
@@ -170,10 +172,10 @@ template <class Lanes>
     }
     return gains;
   };
-  advance_controlled(x, drive(&FosterLane::begin), drive(&FosterLane::end), gains_at, surface,
-                     tolerance_k);
+  advance_controlled<kModes>(x, drive(&FosterLane::begin), drive(&FosterLane::end), gains_at,
+                             surface, tolerance_k);
   for (std::size_t l = 0; l < kFosterLanes; ++l) {
-    for (std::size_t i = 0; i < kMaxFosterModes; ++i) (*lanes[l]->x)[i] = x[i][l];
+    for (std::size_t i = 0; i < kModes; ++i) (*lanes[l]->x)[i] = x[i][l];
   }
 }
 
@@ -182,7 +184,7 @@ template <class Lanes>
 FosterAdvance foster_advance(FosterState<double>& x, const FosterDrive<double>& begin,
                              const FosterDrive<double>& end, const FosterLadder& ladder,
                              const FosterSurface<double>& surface, double tolerance_k) noexcept {
-  return advance_controlled(
+  return advance_controlled<kMaxFosterModes>(
       x, begin, end, [&](std::size_t level) -> const auto& { return ladder.level[level]; }, surface,
       tolerance_k);
 }
@@ -193,40 +195,46 @@ using AdvanceGroup = void (*)(const std::array<const FosterLane*, kFosterLanes>&
                               double tolerance_k) noexcept;
 
 /// `flatten` inlines all that is called, so that it is compiled for these registers.
+template <std::size_t kModes>
 [[gnu::flatten]] void advance_plain(const std::array<const FosterLane*, kFosterLanes>& lanes,
                                     double tolerance_k) noexcept {
-  advance_lanes<WideLanes<16>>(lanes, tolerance_k);
+  advance_lanes<WideLanes<16>, kModes>(lanes, tolerance_k);
 }
 
 // clang inlines no function into one of another target, so it takes the plain one.
 #if defined(__x86_64__) && !defined(__clang__)
 #define EMIT_HAS_AVX2_LANES
+template <std::size_t kModes>
 [[gnu::flatten, gnu::target("avx2")]] void advance_avx2(
     const std::array<const FosterLane*, kFosterLanes>& lanes, double tolerance_k) noexcept {
-  advance_lanes<WideLanes<32>>(lanes, tolerance_k);
+  advance_lanes<WideLanes<32>, kModes>(lanes, tolerance_k);
 }
 #endif
 
 /// Returns the fastest function that this machine runs. All have the same bits, because none fuses
 /// multiplications with additions.
+template <std::size_t kModes>
 AdvanceGroup fastest_advance() noexcept {
 #if defined(EMIT_HAS_AVX2_LANES)
-  if (__builtin_cpu_supports("avx2")) return advance_avx2;
+  if (__builtin_cpu_supports("avx2")) return advance_avx2<kModes>;
 #endif
-  return advance_plain;
+  return advance_plain<kModes>;
 }
 
 }  // namespace
 
 void foster_advance_all(std::span<const FosterLane> lanes, double tolerance_k) noexcept {
-  static const AdvanceGroup advance = fastest_advance();
+  static const AdvanceGroup advance_few = fastest_advance<kFewFosterModes>();
+  static const AdvanceGroup advance_all = fastest_advance<kMaxFosterModes>();
   while (lanes.size() > 1) {
     // Fill lanes without a surface with the first one, whose result is stored again.
     std::array<const FosterLane*, kFosterLanes> group;
     group.fill(&lanes.front());
     const std::size_t count = std::min(lanes.size(), kFosterLanes);
     for (std::size_t l = 0; l < count; ++l) group[l] = &lanes[l];
-    advance(group, tolerance_k);
+    const bool few = std::ranges::all_of(
+        group, [](const FosterLane* lane) { return lane->ladder->modes <= kFewFosterModes; });
+    (few ? advance_few : advance_all)(group, tolerance_k);
     lanes = lanes.subspan(count);
   }
   for (const FosterLane& lane : lanes) {

@@ -198,7 +198,7 @@ Result<void> check(std::span<const StackLayer> layers, const NetworkOptions& opt
   if (options.modes < 1 || options.modes > kMaxFosterModes ||
       !positive(options.shortest_period_s) || !positive(options.longest_period_s) ||
       !(options.film_w_m2_k >= 0.0)) {
-    return make_error(ErrorCode::config, "a thermal network has 1 to 4 modes and positive periods");
+    return make_error(ErrorCode::config, "a thermal network has 1 to 6 modes and positive periods");
   }
   return {};
 }

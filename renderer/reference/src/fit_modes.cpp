@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "fit_history.hpp"
 
@@ -132,7 +133,9 @@ Solution minimise(const FitProblem& problem, FitModel model, const std::vector<M
   ceres::Solve(options, &solver, &summary);
   Solution out;
   out.modes = modes_of(p.data(), start.size());
-  out.cost = summary.final_cost;
+  // A search that could not begin has no cost that could be compared.
+  out.cost =
+      summary.IsSolutionUsable() ? summary.final_cost : std::numeric_limits<double>::infinity();
   out.iterations = static_cast<std::uint32_t>(summary.iterations.size());
   out.converged = summary.termination_type == ceres::CONVERGENCE;
   return out;
@@ -142,7 +145,7 @@ Solution minimise(const FitProblem& problem, FitModel model, const std::vector<M
 std::vector<Mode> shares_of(const physics::FosterNetwork& network) {
   std::vector<Mode> modes;
   for (std::size_t i = 0; i < network.count; ++i) {
-    modes.push_back({std::max(network.modes[i].tau_s, 1.5 * kFastestTauS),
+    modes.push_back({std::clamp(network.modes[i].tau_s, 1.5 * kFastestTauS, kSlowestTauS / 1.5),
                      network.modes[i].resistance_m2k_w / network.resistance_m2k_w()});
   }
   return modes;
@@ -156,12 +159,13 @@ Result<std::vector<std::vector<Mode>>> foster_starts(const scene::Material& mate
     layers.push_back({layer.thickness_m, layer.conductivity_w_m_k,
                       layer.density_kg_m3 * layer.specific_heat_j_kg_k});
   }
-  // The last range finds the minimum of dry soil over moist soil, whose slow modes matter.
-  constexpr double kPeriods[][2] = {{600.0, 172'800.0},
+  // The first range is that of modes without a fit. It finds the minimum of dry soil over moist
+  // soil, whose slow modes matter.
+  constexpr double kPeriods[][2] = {{100.0, 864'000.0},
                                     {60.0, 172'800.0},
                                     {200.0, 86'400.0},
                                     {60.0, 20'000.0},
-                                    {600.0, 864'000.0}};
+                                    {600.0, 172'800.0}};
   std::vector<std::vector<Mode>> starts;
   for (std::uint32_t i = 0; i < std::clamp(options.starts, 1U, 5U); ++i) {
     auto network = physics::network_of_stack(layers, {.modes = options.modes,

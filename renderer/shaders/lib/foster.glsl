@@ -2,10 +2,25 @@
 #ifndef EMIT_LIB_FOSTER
 #define EMIT_LIB_FOSTER
 
-// Flux-driven thermal network of four modes (physics.md eq. 16 to 18). Twin of emit/physics/foster.hpp, which computes
-// the gains in double on the CPU. A state is the temperature of a mode above the base, in K.
+// Flux-driven thermal network of up to six modes (physics.md eq. 16 to 18). Twin of emit/physics/foster.hpp, which
+// computes the gains in double on the CPU. A state is the temperature of a mode above the base, in K. Modes come by
+// fours: EMIT_FOSTER_GROUPS is 1 where no material of the scene has more than four, else 2.
 #include "lib/equilibrium.glsl"
 #include "lib/evaporation.glsl"
+
+// A number for each mode.
+struct FosterModes {
+  vec4 group[EMIT_FOSTER_GROUPS];
+};
+
+// Sum over all modes.
+float foster_sum(FosterModes x) {
+  float sum = (x.group[0].x + x.group[0].y) + (x.group[0].z + x.group[0].w);
+  for (int g = 1; g < EMIT_FOSTER_GROUPS; ++g) {
+    sum += (x.group[g].x + x.group[g].y) + (x.group[g].z + x.group[g].w);
+  }
+  return sum;
+}
 
 // Inputs that drive a surface at an instant.
 struct FosterDrive {
@@ -20,14 +35,14 @@ FosterDrive drive_between(FosterDrive a, FosterDrive b, float f) {
 
 // Constants of one surface.
 struct FosterSurface {
-  vec4 resistance_m2k_w;
+  FosterModes resistance_m2k_w;
   float emission_w_m2_k4;  // emissivity * sigma
   float base_offset_k;     // base temperature minus reference_k
   float reference_k;
 };
 
 // Surface temperature minus the reference, in K, for the states `x`.
-float foster_offset_k(vec4 x, FosterSurface s) { return s.base_offset_k + ((x.x + x.y) + (x.z + x.w)); }
+float foster_offset_k(FosterModes x, FosterSurface s) { return s.base_offset_k + foster_sum(x); }
 
 // Net flux into the surface in W/m2 at a temperature that is given as an offset from the reference.
 float foster_flux_w_m2(float offset_k, FosterDrive drive, FosterSurface s) {
@@ -39,29 +54,42 @@ float foster_flux_w_m2(float offset_k, FosterDrive drive, FosterSurface s) {
 
 // True for a moist surface whose flux at the start, held over the whole step, would carry it past its balance by more
 // than it is off. Half of such a flux rings from step to step.
-bool foster_rings(vec4 x, float q_begin, FosterDrive begin, vec4 whole_frac, FosterSurface s) {
+bool foster_rings(FosterModes x, float q_begin, FosterDrive begin, FosterModes start_frac, FosterModes end_frac,
+                  FosterSurface s) {
   if (!(begin.moist.y > 0.0)) return false;
-  vec4 there = x + (s.resistance_m2k_w * q_begin - x) * whole_frac;
+  FosterModes there;
+  for (int g = 0; g < EMIT_FOSTER_GROUPS; ++g) {
+    there.group[g] = x.group[g] + (s.resistance_m2k_w.group[g] * q_begin - x.group[g]) *
+                                      (start_frac.group[g] + end_frac.group[g]);
+  }
   float q_there = foster_flux_w_m2(foster_offset_k(there, s), begin, s);
   return (q_there + q_begin) * q_begin < 0.0;
 }
 
 // States after one step whose drive goes from `begin` to `end`. The flux at its start is that of `begin`. Sets
 // `clamped` where an input lies outside its range.
-vec4 foster_step(vec4 x, FosterDrive begin, FosterDrive end, vec4 start_frac, vec4 end_frac, FosterSurface s,
-                 inout bool clamped) {
+FosterModes foster_step(FosterModes x, FosterDrive begin, FosterDrive end, FosterModes start_frac,
+                        FosterModes end_frac, FosterSurface s, inout bool clamped) {
   // Let the flux at the end count for the whole step where that at the start would ring.
   float begin_offset_k = foster_offset_k(x, s);
   float q_begin = foster_flux_w_m2(begin_offset_k, begin, s);
-  if (foster_rings(x, q_begin, begin, start_frac + end_frac, s)) {
-    end_frac += start_frac;
-    start_frac = vec4(0.0);
+  if (foster_rings(x, q_begin, begin, start_frac, end_frac, s)) {
+    for (int g = 0; g < EMIT_FOSTER_GROUPS; ++g) {
+      end_frac.group[g] += start_frac.group[g];
+      start_frac.group[g] = vec4(0.0);
+    }
   }
   // Advance the states with the flux at the start; the flux at the end is still missing.
-  vec4 partial = x + ((s.resistance_m2k_w * q_begin - x) * start_frac - x * end_frac);
+  FosterModes partial;
+  FosterModes gain;
+  for (int g = 0; g < EMIT_FOSTER_GROUPS; ++g) {
+    vec4 own = x.group[g];
+    partial.group[g] =
+        own + ((s.resistance_m2k_w.group[g] * q_begin - own) * start_frac.group[g] - own * end_frac.group[g]);
+    gain.group[g] = s.resistance_m2k_w.group[g] * end_frac.group[g];
+  }
   float p_k = foster_offset_k(partial, s);
-  vec4 gain = s.resistance_m2k_w * end_frac;
-  float r_m2k_w = (gain.x + gain.y) + (gain.z + gain.w);
+  float r_m2k_w = foster_sum(gain);
   if (!(r_m2k_w > 0.0)) return x;  // no time passed
   // Take the latent heat along its tangent at the start, so that the balance stays a quartic.
   float begin_k = s.reference_k + begin_offset_k;
@@ -83,7 +111,8 @@ vec4 foster_step(vec4 x, FosterDrive begin, FosterDrive end, vec4 start_frac, ve
   }
   // Add the flux at the end, from the side of the equation that loses less to rounding.
   float q_end = slope * r_m2k_w > 1.0 ? (offset_k - p_k) * conductance : foster_flux_w_m2(offset_k, end, s);
-  return partial + gain * q_end;
+  for (int g = 0; g < EMIT_FOSTER_GROUPS; ++g) partial.group[g] += gain.group[g] * q_end;
+  return partial;
 }
 
 #endif

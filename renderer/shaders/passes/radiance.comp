@@ -94,9 +94,14 @@ layout(binding = EMIT_TEX_SUN_NOW) uniform sampler2D sun_now_texture;
 float temperature_at(ivec2 px, int material) {
   vec4 start = material_start(material);
   if (start.z > 0.5) return frame.reference_k + start.y;
-#ifdef EMIT_FOSTER
+#ifdef EMIT_FOSTER_GROUPS
   vec4 x = texelFetch(state_texture, px, 0);
-  return frame.reference_k + (start.w + ((x.x + x.y) + (x.z + x.w)));
+  float sum_k = (x.x + x.y) + (x.z + x.w);
+#if EMIT_FOSTER_GROUPS > 1
+  vec4 more = texelFetch(state_texture, px + ivec2(0, textureSize(state_texture, 0).y / EMIT_FOSTER_GROUPS), 0);
+  sum_k += (more.x + more.y) + (more.z + more.w);
+#endif
+  return frame.reference_k + (start.w + sum_k);
 #else
   vec2 x = texelFetch(state_texture, px, 0).rg;
   // Read the weights of the first interval. They are the same in every interval.

@@ -4,28 +4,27 @@ layout(binding = EMIT_TEX_MATERIALS) uniform samplerBuffer material_table;     /
 layout(binding = EMIT_TEX_RELAXATION) uniform samplerBuffer relaxation_table;  // RelaxationParams
 
 // Surface of a material: solar absorptance, emissivity, conductance in W m-2 K-1, base temperature in K.
-vec4 material_surface(int material) { return texelFetch(material_table, material * 4); }
+vec4 material_surface(int material) { return texelFetch(material_table, material * EMIT_MATERIAL_TEXELS); }
 
 // Temperatures of a material: initial offset in K, prescribed offset in K, 1 if prescribed, base offset in K.
-vec4 material_start(int material) { return texelFetch(material_table, material * 4 + 1); }
+vec4 material_start(int material) { return texelFetch(material_table, material * EMIT_MATERIAL_TEXELS + 1); }
 
-// Resistances of the four modes of a material in m2 K W-1.
-vec4 material_resistance_m2k_w(int material) { return texelFetch(material_table, material * 4 + 2); }
+// Resistances of four modes of a material in m2 K W-1. `group` counts the modes by fours.
+vec4 material_resistance_m2k_w(int material, int group) {
+  return texelFetch(material_table, material * EMIT_MATERIAL_TEXELS + 2 + group);
+}
 
 // Roughness factor of a material.
-float material_roughness(int material) { return texelFetch(material_table, material * 4 + 3).x; }
+float material_roughness(int material) { return texelFetch(material_table, material * EMIT_MATERIAL_TEXELS + 4).x; }
 
 // Water of a material: wetness (0: dry), resistance to evaporation in sunlight and without it in s/m.
-vec3 material_water(int material) { return texelFetch(material_table, material * 4 + 3).yzw; }
+vec3 material_water(int material) { return texelFetch(material_table, material * EMIT_MATERIAL_TEXELS + 4).yzw; }
 
 // Mode 0 or 1 of emit2014: gain at the start, gain at the end, weight, 0.
 vec4 relaxation_mode(int entry, int mode) { return texelFetch(relaxation_table, entry * 2 + mode); }
 
-// Gains of the four modes of foster for the flux at the start of a step.
-vec4 foster_start_frac(int entry) { return texelFetch(relaxation_table, entry * 2); }
-
-// Gains of the four modes of foster for the flux at the end of a step.
-vec4 foster_end_frac(int entry) { return texelFetch(relaxation_table, entry * 2 + 1); }
+// First texel of the gains of foster for a split of an interval.
+int foster_gains_at(int entry, int level) { return (entry + level * EMIT_FOSTER_TEXELS) * 2; }
 
 // foster: share of a face that rain has wetted, at the start and the end of an interval. Rain falls straight down, and
 // nothing above the face keeps it off. The table has ground with all of the rain, half of it, and none.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Advances every visible surface point over one interval of the thermal history, with convection, layers and
-// surroundings: soft shadow, surface balance, four flux-driven states (physics.md eq. 16 to 18). Inside an interval the
+// surroundings: soft shadow, surface balance, up to six flux-driven states (physics.md eq. 16 to 18). Inside an interval the
 // shade is constant, at its mean, and everything else is linear. The interval is split until doubling the number of
 // steps changes nothing by more than the tolerance.
 #include "passes/gbuffer.glsl"
@@ -16,16 +16,42 @@ layout(binding = EMIT_TEX_OCCLUSION) uniform sampler2D occlusion_texture;
 layout(binding = EMIT_TEX_SPIN_UP) uniform samplerBuffer spin_up_table;
 layout(rgba32f, binding = EMIT_IMG_STATE) uniform image2D state_image;
 
+// Four states of a node of the spin-up table. `group` counts the modes by fours.
+vec4 spin_up_texel(int node, int group) { return texelFetch(spin_up_table, node * EMIT_FOSTER_TEXELS + group); }
+
 // States before the first interval for a material and a direction, bilinear over an octahedral grid of directions.
-vec4 spun_up_states(int material, vec3 n) {
+FosterModes spun_up_states(int material, vec3 n) {
   int nodes = int(frame.spin_up_nodes);
   vec2 place = (octahedral_from_unit(n) * 0.5 + 0.5) * float(nodes - 1);
   ivec2 low = clamp(ivec2(floor(place)), ivec2(0), ivec2(nodes - 2));
   vec2 weight = place - vec2(low);
   int at = (material * nodes + low.y) * nodes + low.x;
-  vec4 south = mix(texelFetch(spin_up_table, at), texelFetch(spin_up_table, at + 1), weight.x);
-  vec4 north = mix(texelFetch(spin_up_table, at + nodes), texelFetch(spin_up_table, at + nodes + 1), weight.x);
-  return mix(south, north, weight.y);
+  FosterModes states;
+  for (int g = 0; g < EMIT_FOSTER_GROUPS; ++g) {
+    vec4 south = mix(spin_up_texel(at, g), spin_up_texel(at + 1, g), weight.x);
+    vec4 north = mix(spin_up_texel(at + nodes, g), spin_up_texel(at + nodes + 1, g), weight.x);
+    states.group[g] = mix(south, north, weight.y);
+  }
+  return states;
+}
+
+// States of a pixel. Those of the second group lie below the image of the first.
+ivec2 state_place(ivec2 px, int group) { return px + ivec2(0, group * (imageSize(state_image).y / EMIT_FOSTER_GROUPS)); }
+FosterModes stored_states(ivec2 px) {
+  FosterModes states;
+  for (int g = 0; g < EMIT_FOSTER_GROUPS; ++g) states.group[g] = imageLoad(state_image, state_place(px, g));
+  return states;
+}
+void store_states(ivec2 px, FosterModes states) {
+  for (int g = 0; g < EMIT_FOSTER_GROUPS; ++g) imageStore(state_image, state_place(px, g), states.group[g]);
+}
+
+// Gains of the modes for the flux at the start (`end` = 0) and at the end (1) of a step.
+FosterModes foster_gains(int entry, int level, int end) {
+  FosterModes gains;
+  int at = foster_gains_at(entry, level) + end;
+  for (int g = 0; g < EMIT_FOSTER_GROUPS; ++g) gains.group[g] = texelFetch(relaxation_table, at + 2 * g);
+  return gains;
 }
 
 // Short-wave irradiance of a face without the direct sun.
@@ -74,13 +100,20 @@ void main() {
   if (!unshaded) sky_frac *= min(2.0 * texelFetch(occlusion_texture, px, 0).r, 1.0);
 
   FosterSurface s;
-  s.resistance_m2k_w = material_resistance_m2k_w(material);
+  for (int g = 0; g < EMIT_FOSTER_GROUPS; ++g) {
+    s.resistance_m2k_w.group[g] = material_resistance_m2k_w(material, g);
+  }
   s.emission_w_m2_k4 = surface.y * EMIT_STEFAN_BOLTZMANN_W_M2_K4;
   s.base_offset_k = start.w;
   s.reference_k = frame.reference_k;
 
   // Read the states and take the film at the temperature at the start.
-  vec4 x0 = (flags & EMIT_STEP_FIRST) != 0u ? spun_up_states(material, n) : imageLoad(state_image, px);
+  FosterModes x0;
+  if ((flags & EMIT_STEP_FIRST) != 0u) {
+    x0 = spun_up_states(material, n);
+  } else {
+    x0 = stored_states(px);
+  }
   float roughness = material_roughness(material);
   float excess_k = foster_offset_k(x0, s) - step_params.air_start_offset_k;
   // Set up the drive at both ends: absorbed flux, film coefficient, air temperature, exchange of water.
@@ -110,13 +143,14 @@ void main() {
 
   // Advance over the whole interval in one step.
   bool clamped = false;
-  vec4 x = foster_step(x0, lit_begin, lit_end, foster_start_frac(entry), foster_end_frac(entry), s, clamped);
+  FosterModes x =
+      foster_step(x0, lit_begin, lit_end, foster_gains(entry, 0, 0), foster_gains(entry, 0, 1), s, clamped);
   // Double the number of steps until neither a state nor the temperature changes by more than the tolerance.
   for (int level = 1; level <= EMIT_FOSTER_LEVELS; ++level) {
-    vec4 gain_start = foster_start_frac(entry + level);
-    vec4 gain_end = foster_end_frac(entry + level);
+    FosterModes gain_start = foster_gains(entry, level, 0);
+    FosterModes gain_end = foster_gains(entry, level, 1);
     int steps = 1 << level;
-    vec4 coarse = x;
+    FosterModes coarse = x;
     x = x0;
     FosterDrive from = lit_begin;
     for (int i = 1; i <= steps; ++i) {
@@ -126,11 +160,13 @@ void main() {
       x = foster_step(x, from, to, gain_start, gain_end, s, clamped);
       from = to;
     }
-    vec4 change_k = abs(x - coarse);
-    float total_k = abs(foster_offset_k(x, s) - foster_offset_k(coarse, s));
-    float worst_k = max(max(max(change_k.x, change_k.y), max(change_k.z, change_k.w)), total_k);
+    float worst_k = abs(foster_offset_k(x, s) - foster_offset_k(coarse, s));
+    for (int g = 0; g < EMIT_FOSTER_GROUPS; ++g) {
+      vec4 change_k = abs(x.group[g] - coarse.group[g]);
+      worst_k = max(worst_k, max(max(change_k.x, change_k.y), max(change_k.z, change_k.w)));
+    }
     if (!(worst_k > frame.step_tolerance_k)) break;
   }
   if (clamped) atomicAdd(stats.flagged_px[EMIT_FLAG_CLAMPED], 1u);
-  imageStore(state_image, px, x);
+  store_states(px, x);
 }

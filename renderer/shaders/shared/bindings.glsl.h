@@ -143,5 +143,10 @@
 
 // foster: the finest split of an interval has 2 to this power parts.
 #define EMIT_FOSTER_LEVELS 6
-// foster: entries of the relaxation table per material: one for each split, and the wetness.
-#define EMIT_FOSTER_ENTRIES (EMIT_FOSTER_LEVELS + 2)
+// Texels of the material table per material.
+#define EMIT_MATERIAL_TEXELS 5
+
+// foster: texels of four floats that hold one number for each of up to six modes. The last two floats are 0.
+#define EMIT_FOSTER_TEXELS 2
+// foster: entries of the relaxation table per material: those of each split, and the wetness.
+#define EMIT_FOSTER_ENTRIES ((EMIT_FOSTER_LEVELS + 1) * EMIT_FOSTER_TEXELS + 1)

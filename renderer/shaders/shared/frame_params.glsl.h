@@ -60,7 +60,7 @@ struct DrawParams {
   uint unused1;
 };
 
-// Four texels of the material table.
+// Five texels of the material table.
 struct MaterialParams {
   float solar_absorptance_frac;
   float emissivity_frac;
@@ -70,7 +70,7 @@ struct MaterialParams {
   float prescribed_offset_k;  // prescribed temperature minus the reference temperature
   float prescribed;           // 1: the temperature is prescribed; 0: it is simulated
   float base_offset_k;        // foster: base temperature minus the reference temperature
-  vec4 resistance_m2k_w;      // foster: resistance of each mode
+  vec4 resistance_m2k_w[EMIT_FOSTER_TEXELS];  // foster: resistance of each mode
   float roughness;            // foster: factor of the forced part of the film
   float wetness_frac;         // foster: share of the surface's potential evaporation; 0: dry
   float resistance_s_m;       // foster: resistance to evaporation in sunlight
@@ -153,9 +153,9 @@ struct StepParams {
 // Two texels of the relaxation table.
 // emit2014: the exact step of one material over one interval (lib/relaxation.glsl). A texel belongs to a mode and holds
 // the gain of the drive at the start, the gain at the end, the weight of the mode, 0.
-// foster: one entry per split of the interval (lib/foster.glsl). `first` holds the gains of the four modes for the flux
-// at the start, `second` those for the flux at the end. One entry follows them: `first` and `second` hold the share of
-// open, level ground that rain has wetted, at the start and the end of the interval, and zeros.
+// foster: EMIT_FOSTER_TEXELS entries per split of the interval (lib/foster.glsl). `first` holds the gains of four modes
+// for the flux at the start, `second` those for the flux at the end. One entry follows them: `first` and `second` hold
+// the share of open, level ground that rain has wetted, at the start and the end of the interval, and zeros.
 struct RelaxationParams {
   vec4 first;
   vec4 second;
@@ -225,10 +225,10 @@ static_assert(sizeof(DrawParams) == 192);
 EMIT_SHARED_OFFSET(DrawParams, material, 112);
 EMIT_SHARED_OFFSET(DrawParams, tile_row, 128);
 EMIT_SHARED_OFFSET(DrawParams, field, 176);
-static_assert(sizeof(MaterialParams) == 64);
+static_assert(sizeof(MaterialParams) == 80);
 EMIT_SHARED_OFFSET(MaterialParams, initial_offset_k, 16);
 EMIT_SHARED_OFFSET(MaterialParams, resistance_m2k_w, 32);
-EMIT_SHARED_OFFSET(MaterialParams, roughness, 48);
+EMIT_SHARED_OFFSET(MaterialParams, roughness, 64);
 static_assert(sizeof(CascadeParams) == 80);
 EMIT_SHARED_OFFSET(CascadeParams, scale_per_m, 48);
 EMIT_SHARED_OFFSET(CascadeParams, end_boresight_m, 60);

@@ -17,11 +17,6 @@ using physics::FosterDrive;
 using physics::FosterState;
 using physics::FosterSurface;
 
-/// Adds all modes, in a fixed order.
-double sum(const FosterState<double>& x) noexcept {
-  return (x[0] + x[1]) + (x[2] + x[3]);
-}
-
 /// Returns the exitance of a black surface.
 double exitance_w_m2(double temperature_k) noexcept {
   const double t2 = temperature_k * temperature_k;
@@ -515,7 +510,7 @@ void FosterHeat::step_response(std::uint32_t material, const ResponseConditions&
     }
     now_s = times_s[j];
     // Scale by the absorbed share of the direct sunlight.
-    response_m2k_w[j] = m.solar_absorptance_frac * sum(x);
+    response_m2k_w[j] = m.solar_absorptance_frac * physics::foster_sum(x);
   }
 }
 

@@ -55,10 +55,6 @@ struct ErrorOptions {
 using Clock = std::chrono::steady_clock;
 using physics::Result;
 
-/// Spin-up of the scenarios that do not state one, so that all models are compared with the same
-/// reference.
-constexpr std::int64_t kSpinUpNs = 172'800'000'000'000;
-
 /// Model that computes temperatures: the renderer by either method, or a ray tracer (Embree) that
 /// starts anew for every frame, with one ray to the sun per pixel and step.
 enum class Method : std::uint8_t { per_frame, cached, embree };
@@ -462,7 +458,10 @@ Result<scene::ScenarioDesc> suite_scenario(const std::string& name, const ErrorO
   scenario->sensor.width_px = command.width_px;
   scenario->sensor.height_px = command.height_px;
   scenario->thermal.model = scene::ThermalModel::foster;
-  if (scenario->thermal.spin_up_ns == 0) scenario->thermal.spin_up_ns = kSpinUpNs;
+  // Begin with the reference, from the same profile of the ground: its slowest states last for
+  // weeks, so that a day more before the history would show as an error of half a kelvin.
+  scenario->thermal.spin_up_ns = std::max<std::int64_t>(
+      scenario->thermal.spin_up_ns, std::llround(reference::SolveOptions{}.spin_up_s * 1e9));
   if (scenario->sensor.trajectory.empty()) {
     return physics::make_error(physics::ErrorCode::config,
                                fmt::format("{}: the sensor has no trajectory", name));

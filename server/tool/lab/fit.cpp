@@ -187,17 +187,34 @@ struct FitOutput {
   std::string toml;
 };
 
+/// Worst error over the judged histories, RMS and greatest, that needs no further mode.
+constexpr double kEnoughRmsK = 0.02;
+constexpr double kEnoughMaxK = 0.1;
+
+/// Fits one material with the modes of `options`, or with the fewest modes that are enough if
+/// `fewest`. A network of more modes costs time in every step. Errors: those of the fit.
+Result<reference::FitResult> fit_one(const scene::Material& material, const FitInput& input,
+                                     reference::FitOptions options, bool fewest) {
+  const std::size_t most = options.modes;
+  for (options.modes = fewest ? 1 : most;; ++options.modes) {
+    auto fit = !input.curve.empty()
+                   ? reference::fit_curve(material, input.curve, options)
+                   : reference::fit_material(material, input.forcing, input.start_s,
+                                             input.initial_k, options);
+    const bool enough = fit && fit->rms_k <= kEnoughRmsK && fit->max_k <= kEnoughMaxK;
+    if (!fit || enough || options.modes >= most) return fit;
+  }
+}
+
 /// Fits every material. Errors: those of the fit.
-Result<FitOutput> fit_all(const FitInput& input, const reference::FitOptions& options) {
+Result<FitOutput> fit_all(const FitInput& input, const reference::FitOptions& options,
+                          bool fewest) {
   const bool foster = options.model == reference::FitModel::foster;
   FitOutput out;
   Progress bar("fitting", input.materials.size());
   for (std::size_t i = 0; i < input.materials.size(); ++i) {
     const scene::Material& material = input.materials[i];
-    const auto fit = !input.curve.empty()
-                         ? reference::fit_curve(material, input.curve, options)
-                         : reference::fit_material(material, input.forcing, input.start_s,
-                                                   input.initial_k, options);
+    const auto fit = fit_one(material, input, options, fewest);
     if (!fit) {
       bar.finish();
       return tl::unexpected(fit.error());
@@ -256,7 +273,7 @@ int run(const FitOptions& command) {
   options.model =
       command.model == "emit2014" ? reference::FitModel::emit2014 : reference::FitModel::foster;
   const bool foster = options.model == reference::FitModel::foster;
-  options.modes = command.modes.value_or(foster ? 4U : 2U);
+  options.modes = command.modes.value_or(foster ? physics::kMaxFosterModes : 2U);
   if (!foster && options.modes > 2) return fail(kExitUsage, "emit2014 has at most 2 modes");
   options.history_s = command.history_s;
   options.spin_up_s = command.spin_up_s;
@@ -272,7 +289,7 @@ int run(const FitOptions& command) {
     const auto good = check_fit_library(*library, input->materials, command.input.scenario);
     if (!good) return fail_input(good.error());
   }
-  auto output = fit_all(*input, options);
+  auto output = fit_all(*input, options, foster && !command.modes);
   if (!output) return fail_call(output.error());
   std::FILE* text = command.toml == "-" ? stderr : text_stream(command.json);
   fmt::print(text, "{}", output->table.to_string());
@@ -297,9 +314,11 @@ void add_options(CommandLine& line, FitOptions& options) {
               "Material; repeatable; default: all of the scenario, or soil with --measured")
       .repeatable()
       .type_name("NAME");
-  line.option("--modes", options.modes, "foster: 2 to 4, default 4; emit2014: 1 or 2, default 2")
+  line.option("--modes", options.modes,
+              "foster: 1 to 6, default: the fewest of them that bring the worst error below "
+              "0.02 K RMS and 0.1 K; emit2014: 1 or 2, default 2")
       .type_name("N")
-      .in_range(1, 4);
+      .in_range(1, 6);
   line.option("--model", options.model, "Model whose modes are fitted")
       .one_of({"foster", "emit2014"})
       .show_default();

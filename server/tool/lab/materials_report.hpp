@@ -29,8 +29,8 @@ struct MaterialEntry {
 };
 
 /// Bars of the check, for the largest RMS and the largest error of a material in a climate.
-inline constexpr double kClimateRmsBarK = 0.4;
-inline constexpr double kClimateMaxBarK = 1.5;
+inline constexpr double kClimateRmsBarK = 0.25;
+inline constexpr double kClimateMaxBarK = 0.35;
 
 /// Returns the families in the order in which they first occur.
 [[nodiscard]] std::vector<std::string> families_of(std::span<const MaterialEntry> entries);

@@ -24,7 +24,8 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   const gl::Define taps[] = {{"EMIT_BLOCKER_TAPS", "8u"}, {"EMIT_FILTER_TAPS", "32u"}};
   auto thermal = gl::Program::compute("passes/thermal.comp", taps);
   ASSERT_TRUE(thermal) << thermal.error().text;
-  auto foster = gl::Program::compute("passes/thermal_foster.comp", taps);
+  const gl::Define modes[] = {taps[0], taps[1], {"EMIT_FOSTER_GROUPS", "2"}};
+  auto foster = gl::Program::compute("passes/thermal_foster.comp", modes);
   ASSERT_TRUE(foster) << foster.error().text;
   // Use both kinds of air, so that no member of BandParams is optimised away.
   const gl::Define content[] = {{"EMIT_BANDS", "4u"},     {"EMIT_AIR_TERMS", "5u"},
@@ -124,7 +125,7 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
       radiance->uniform_offset("band_uniforms[2].air_view_first"),
       static_cast<GLint>(2 * sizeof(gpu::BandParams) + offsetof(gpu::BandParams, air_view_first)));
   // Check tables that shaders fetch as texels of four floats.
-  EXPECT_EQ(sizeof(gpu::MaterialParams), 4U * 16U);
+  EXPECT_EQ(sizeof(gpu::MaterialParams), 5U * 16U);
   EXPECT_EQ(offsetof(gpu::MaterialParams, initial_offset_k), 16U);
   EXPECT_EQ(offsetof(gpu::MaterialParams, base_offset_k), 28U);
   EXPECT_EQ(offsetof(gpu::MaterialParams, resistance_m2k_w), 32U);

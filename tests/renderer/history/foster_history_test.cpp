@@ -79,14 +79,18 @@ double looked_up_k(const FosterHistory& history, std::size_t m, glm::dvec3 n) {
   const int i = std::min(static_cast<int>(x), nodes - 2);
   const int j = std::min(static_cast<int>(y), nodes - 2);
   const auto at = [&](int column, int row) {
-    return glm::dvec4(history.table()[(m * history.grid_nodes() + static_cast<std::size_t>(row)) *
-                                          history.grid_nodes() +
-                                      static_cast<std::size_t>(column)]);
+    return history
+        .table()[(m * history.grid_nodes() + static_cast<std::size_t>(row)) * history.grid_nodes() +
+                 static_cast<std::size_t>(column)];
   };
-  const glm::dvec4 states =
-      (1.0 - (y - j)) * ((1.0 - (x - i)) * at(i, j) + (x - i) * at(i + 1, j)) +
-      (y - j) * ((1.0 - (x - i)) * at(i, j + 1) + (x - i) * at(i + 1, j + 1));
-  physics::FosterState<double> state{states.x, states.y, states.z, states.w};
+  physics::FosterState<double> state{};
+  for (std::size_t k = 0; k < state.size(); ++k) {
+    const auto value = [&](int column, int row) {
+      return static_cast<double>(at(column, row)[k / 4][static_cast<glm::length_t>(k % 4)]);
+    };
+    state[k] = (1.0 - (y - j)) * ((1.0 - (x - i)) * value(i, j) + (x - i) * value(i + 1, j)) +
+               (y - j) * ((1.0 - (x - i)) * value(i, j + 1) + (x - i) * value(i + 1, j + 1));
+  }
   const auto surface = physics::foster_surface(material.network, material.emissivity_frac,
                                                material.base_k, kReferenceK);
   for (const IntervalForcing& interval : history.tail()) {
@@ -245,7 +249,7 @@ TEST(FosterHistory, WeatherBeforeTheStartRunsTheSpinUpAgain) {
   StepPlan plan(s.thermal);
   plan.update(3600 * kSecondNs, environment, {});
   EXPECT_FALSE(history.update(plan, environment));
-  const glm::vec4 before = history.table()[7];
+  const StateTexels before = history.table()[7];
 
   scene::WeatherSample sample;
   sample.sim_time_ns = 1800 * kSecondNs;
@@ -259,7 +263,7 @@ TEST(FosterHistory, WeatherBeforeTheStartRunsTheSpinUpAgain) {
   sample.sim_time_ns = -100'000 * kSecondNs;
   ASSERT_TRUE(environment.append(sample));
   EXPECT_TRUE(history.update(plan, environment));
-  EXPECT_NE(history.table()[7].x, before.x);
+  EXPECT_NE(history.table()[7][0].x, before[0].x);
   EXPECT_FALSE(history.update(plan, environment));
   environment.reset();
   EXPECT_TRUE(history.update(plan, environment));

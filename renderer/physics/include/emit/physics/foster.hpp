@@ -27,7 +27,10 @@
 namespace emit::physics {
 
 /// Largest number of modes of a network.
-inline constexpr std::size_t kMaxFosterModes = 4;
+inline constexpr std::size_t kMaxFosterModes = 6;
+/// Number of modes up to which a network is advanced without the work for more. Sheets and shells
+/// need no more; ground needs all (physics.md, Modes).
+inline constexpr std::size_t kFewFosterModes = 4;
 
 /// One layer of a stack. A stack lists its outermost layer first.
 struct StackLayer {
@@ -66,9 +69,9 @@ struct FosterNetwork {
 
 /// Options of network_of_stack().
 struct NetworkOptions {
-  std::size_t modes = 4;  ///< 1..kMaxFosterModes
-  double shortest_period_s = 600.0;
-  double longest_period_s = 172'800.0;
+  std::size_t modes = kMaxFosterModes;  ///< 1..kMaxFosterModes
+  double shortest_period_s = 100.0;
+  double longest_period_s = 864'000.0;
   /// Conductance of the surface's heat exchange that the fit assumes, W/m2/K: convection plus
   /// linearised radiation. The fit minimises the error of the temperature, which is that of 1/(h +
   /// 1/Z).
@@ -84,9 +87,19 @@ struct NetworkOptions {
 [[nodiscard]] Result<FosterNetwork> network_of_stack(std::span<const StackLayer> layers,
                                                      const NetworkOptions& options = {});
 
-/// States x_i of a surface, K above the base.
+/// States x_i of a surface, K above the base. Those of a network with fewer modes end with zeros.
 template <class Real>
 using FosterState = std::array<Real, kMaxFosterModes>;
+
+/// Returns the sum of all states, K, in a fixed order. `kModes` is kMaxFosterModes, or
+/// kFewFosterModes where no network has more; both have the same bits then.
+template <std::size_t kModes = kMaxFosterModes, class Real>
+[[nodiscard]] constexpr Real foster_sum(const FosterState<Real>& x) noexcept {
+  static_assert(kFewFosterModes == 4 && kMaxFosterModes == 6);
+  const Real few = (x[0] + x[1]) + (x[2] + x[3]);
+  if constexpr (kModes <= kFewFosterModes) return few;
+  return few + (x[4] + x[5]);
+}
 
 // ---- moving base --------------------------------------------------------------------------------
 
@@ -164,10 +177,10 @@ template <class Real>
 }
 
 /// Returns the surface temperature as an offset from the surface's reference, K.
-template <class Real>
+template <std::size_t kModes = kMaxFosterModes, class Real>
 [[nodiscard]] constexpr Real foster_offset_k(const FosterState<Real>& x,
                                              const FosterSurface<Real>& s) noexcept {
-  return s.base_offset_k + ((x[0] + x[1]) + (x[2] + x[3]));
+  return s.base_offset_k + foster_sum<kModes>(x);
 }
 
 /// Returns the net flux into the solid at a surface temperature, W/m2 (physics.md eq. 16 and 47).
@@ -183,14 +196,14 @@ template <class Real>
 /// Returns the flags of moist surfaces whose flux at the start of a step, if it held over the whole
 /// step, would carry them past their balance by more than they are off. Half of such a flux rings
 /// from step to step, and grows where a hot surface evaporates more steeply than a cold one.
-template <class Real>
+template <std::size_t kModes = kMaxFosterModes, class Real>
 [[nodiscard]] Mask<Real> foster_rings(const FosterState<Real>& x, const Real& q_begin,
                                       const FosterDrive<Real>& begin, const FosterGains<Real>& g,
                                       const FosterSurface<Real>& s) noexcept {
   const Mask<Real> moist = begin.dew_w_m2_pa > Real(0);
   if (none(moist)) return moist;
-  Real offset_k = foster_offset_k(x, s);
-  for (std::size_t i = 0; i < kMaxFosterModes; ++i) {
+  Real offset_k = foster_offset_k<kModes>(x, s);
+  for (std::size_t i = 0; i < kModes; ++i) {
     offset_k += (s.resistance_m2k_w[i] * q_begin - x[i]) * (g.start_frac[i] + g.end_frac[i]);
   }
   const Real q_there = foster_flux_w_m2(offset_k, begin, s);
@@ -201,22 +214,23 @@ template <class Real>
 /// temperature is continuous at the start of the step, and the flux there is that of `begin`: a
 /// change of shade acts at once.
 /// Returns true if the surface balance had to be clamped (see solve_equilibrium). The step is
-/// unconditionally stable and second order in its length. Any thread. RT-safe.
-template <class Real>
+/// unconditionally stable and second order in its length. States from `kModes` on stay as they are.
+/// Any thread. RT-safe.
+template <std::size_t kModes = kMaxFosterModes, class Real>
 Mask<Real> foster_step(FosterState<Real>& x, const FosterDrive<Real>& begin,
                        const FosterDrive<Real>& end, const FosterGains<Real>& g,
                        const FosterSurface<Real>& s) noexcept {
   // Advance the states with the flux at the start alone. P of physics.md eq. 18 is the temperature
   // that this gives, R is what each W/m2 of the flux at the end adds to it.
-  const Real begin_offset_k = foster_offset_k(x, s);
+  const Real begin_offset_k = foster_offset_k<kModes>(x, s);
   const Real q_begin = foster_flux_w_m2(begin_offset_k, begin, s);
   // Let the flux at the end count for the whole step where that at the start would ring.
-  const Mask<Real> rings = foster_rings(x, q_begin, begin, g, s);
+  const Mask<Real> rings = foster_rings<kModes>(x, q_begin, begin, g, s);
   FosterState<Real> end_frac;
   FosterState<Real> partial;  // new states before the flux at the end is added
   Real p_k = s.base_offset_k;
   Real r_m2k_w = 0;
-  for (std::size_t i = 0; i < kMaxFosterModes; ++i) {
+  for (std::size_t i = 0; i < kModes; ++i) {
     const Real start_frac = choose(rings, Real(0), g.start_frac[i]);
     end_frac[i] = choose(rings, g.start_frac[i] + g.end_frac[i], g.end_frac[i]);
     partial[i] =
@@ -251,7 +265,7 @@ Mask<Real> foster_step(FosterState<Real>& x, const FosterDrive<Real>& begin,
   const Mask<Real> steep = slope * r_m2k_w > Real(1);
   const Real q_end =
       choose(steep, (offset_k - p_k) * conductance, foster_flux_w_m2(offset_k, end, s));
-  for (std::size_t i = 0; i < kMaxFosterModes; ++i) {
+  for (std::size_t i = 0; i < kModes; ++i) {
     x[i] = choose(lasts, partial[i] + s.resistance_m2k_w[i] * q_end * end_frac[i], x[i]);
   }
   return both(root.clamped, lasts);
@@ -290,8 +304,10 @@ template <class Real>
 /// Finest split of an interval. It has 2^kMaxFosterLevel equal steps.
 inline constexpr int kMaxFosterLevel = 6;
 
-/// Gains of an interval split into 2^level equal steps, level 0..kMaxFosterLevel.
+/// Gains of an interval split into 2^level equal steps, level 0..kMaxFosterLevel, for a network of
+/// `modes` modes.
 struct FosterLadder {
+  std::size_t modes = 0;
   std::array<FosterGains<double>, kMaxFosterLevel + 1> level{};
 };
 /// Returns the gains of an interval of `dt_s` at every level.

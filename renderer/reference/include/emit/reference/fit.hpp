@@ -49,7 +49,7 @@ struct CurvePoint {
 /// Options of the fit functions.
 struct FitOptions {
   FitModel model = FitModel::foster;
-  std::size_t modes = 4;  ///< 1..4 for foster, 1..2 for emit2014
+  std::size_t modes = physics::kMaxFosterModes;  ///< 1..kMaxFosterModes; 1..2 for emit2014
   std::uint32_t starts = 5;
   double spin_up_s = 172'800.0;  ///< length of the unshadowed time before the histories
   double history_s = 12'600.0;   ///< length of the histories

@@ -138,7 +138,7 @@ struct Material {
   std::optional<double> core_conductance_w_m2_k;
   std::optional<double> initial_k;    ///< surface at history start; else thermal.initial_k
   std::vector<RelaxationMode> modes;  ///< emit2014; weights sum to 1
-  /// foster: 1 to 4 modes of all layers together, fastest first. When empty, they are derived from
+  /// foster: 1 to 6 modes of all layers together, fastest first. When empty, they are derived from
   /// the layers.
   std::vector<FosterMode> foster_modes;
   std::optional<FosterFit> foster_fit;  ///< absent: the modes come from the layers alone
@@ -376,7 +376,7 @@ struct ThermalOptions {
   /// foster: material of the surroundings when the weather does not state environment_k. When
   /// empty, default_material is used.
   std::string surroundings_material;
-  /// foster: number of modes derived from the layers, 2 to 4; 0 takes the modes of the material.
+  /// foster: number of modes derived from the layers, 1 to 6; 0 takes the modes of the material.
   std::uint32_t foster_modes = 0;
   std::uint32_t steps = 27;
   StepSpacing spacing = StepSpacing::uniform;
