@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <optional>
+#include <utility>
 
 #include "emit/config/load.hpp"
 #include "emit/physics/csv.hpp"
@@ -191,18 +193,31 @@ struct FitOutput {
 constexpr double kEnoughRmsK = 0.02;
 constexpr double kEnoughMaxK = 0.1;
 
+/// Share of the RMS error of a measured curve that a mode more must take away to be kept: noise has
+/// no modes.
+constexpr double kWorthAModeFrac = 0.1;
+
 /// Fits one material with the modes of `options`, or with the fewest modes that are enough if
 /// `fewest`. A network of more modes costs time in every step. Errors: those of the fit.
 Result<reference::FitResult> fit_one(const scene::Material& material, const FitInput& input,
                                      reference::FitOptions options, bool fewest) {
   const std::size_t most = options.modes;
+  const bool measured = !input.curve.empty();
+  std::optional<reference::FitResult> before;
   for (options.modes = fewest ? 1 : most;; ++options.modes) {
-    auto fit = !input.curve.empty()
-                   ? reference::fit_curve(material, input.curve, options)
-                   : reference::fit_material(material, input.forcing, input.start_s,
-                                             input.initial_k, options);
-    const bool enough = fit && fit->rms_k <= kEnoughRmsK && fit->max_k <= kEnoughMaxK;
-    if (!fit || enough || options.modes >= most) return fit;
+    auto fit = measured ? reference::fit_curve(material, input.curve, options)
+                        : reference::fit_material(material, input.forcing, input.start_s,
+                                                  input.initial_k, options);
+    const bool last = options.modes >= most;
+    if (!fit) {
+      // Too few modes may have no model at all.
+      if (last) return before ? Result<reference::FitResult>(*before) : std::move(fit);
+      continue;
+    }
+    if (measured && before && fit->rms_k > (1.0 - kWorthAModeFrac) * before->rms_k) return *before;
+    const bool enough = fit->rms_k <= kEnoughRmsK && fit->max_k <= kEnoughMaxK;
+    if (enough || last) return fit;
+    before = std::move(*fit);
   }
 }
 
@@ -315,8 +330,9 @@ void add_options(CommandLine& line, FitOptions& options) {
       .repeatable()
       .type_name("NAME");
   line.option("--modes", options.modes,
-              "foster: 1 to 6, default: the fewest of them that bring the worst error below "
-              "0.02 K RMS and 0.1 K; emit2014: 1 or 2, default 2")
+              "foster: 1 to 6, default: the fewest that bring the worst error below 0.02 K RMS "
+              "and 0.1 K, or, with a curve, until one more takes less than a tenth of the error "
+              "away; emit2014: 1 or 2, default 2")
       .type_name("N")
       .in_range(1, 6);
   line.option("--model", options.model, "Model whose modes are fitted")

@@ -18,8 +18,8 @@ namespace emit::physics {
 struct SkyState {
   double cloud_cover_frac = 0.0;  ///< 0..1, the same in all directions
   double cloud_base_m = 0.0;      ///< height of the clouds' base above the ground
-  double cloud_k =
-      0.0;  ///< temperature of the clouds with the air below them, over all wavelengths
+  /// Temperature of the clouds with the air below them, over all wavelengths.
+  double cloud_k = 0.0;
   double cloud_base_k = 0.0;  ///< temperature of the clouds' base itself
   /// The air of the clear share emits as if it were that much warmer than the weather's at the
   /// ground.
@@ -31,13 +31,14 @@ struct SkyState {
 /// is at least `cloud_frac`. Above an overcast sky's irradiance the clouds are warmer, up to the
 /// air at the ground, then all of the sky; below a clear one's all of the sky is colder. A base of
 /// a stated height keeps its temperature; otherwise it is as high and as warm as eq. 12 says. The
-/// irradiance is at least 0. @pre air_k > 0
+/// irradiance is at least 0.
+/// @pre air_k > 0
 [[nodiscard]] SkyState sky_state(double longwave_down_w_m2, double air_k, double dew_point_k,
                                  double cloud_frac, const CloudBase& base) noexcept;
 /// Returns the same for a cover that is known and clouds at a stated height: over all wavelengths
 /// they look as warm as the irradiance asks for, between the clear sky and the air at the ground,
-/// and what is left warms or cools all of the sky. @pre air_k > 0; cover_frac is 0..1;
-/// base.height_m
+/// and what is left warms or cools all of the sky.
+/// @pre air_k > 0, cover_frac is 0..1, and `base` has a height.
 [[nodiscard]] SkyState sky_of_cover(double longwave_down_w_m2, double air_k, double dew_point_k,
                                     double cover_frac, const CloudBase& base) noexcept;
 
