@@ -8,28 +8,40 @@ apt_sources() {
     sort -u | grep -E ' bookworm(-updates|-security)? '
 }
 
-# make_clean_system FOLDER: a minimal Debian 12. The first call downloads it; later ones take it from the cache.
-make_clean_system() {
+# Prints the path of an archive with a minimal Debian 12. The first call downloads it; later ones take it from the cache.
+clean_base() {
   local cache=${XDG_CACHE_HOME:-$HOME/.cache}/emit/bookworm-minbase.tar.zst
   if [[ ! -f $cache ]]; then
     local mirror made
-    mirror=$(apt_sources | awk '$3 == "bookworm" {print $2; exit}')
-    made=$(mktemp -d)
+    # This runs inside a substitution too, where bash goes on after a failure.
+    mirror=$(apt_sources | awk '$3 == "bookworm" {print $2; exit}') && [[ -n $mirror ]] ||
+      { echo "apt has no source of Debian 12" >&2; return 1; }
+    made=$(mktemp -d) || return 1
     debootstrap --variant=minbase --include=ca-certificates bookworm "$made" "$mirror" >"$made.log" 2>&1 ||
       { tail -n 5 "$made.log" >&2; return 1; }
-    mkdir -p "$(dirname "$cache")"
-    tar -C "$made" --one-file-system -c . | zstd -q -T0 -o "$cache.part"
-    mv "$cache.part" "$cache"
+    mkdir -p "$(dirname "$cache")" || return 1
+    tar -C "$made" --one-file-system -c . | zstd -q -f -T0 -o "$cache.part" || return 1
+    mv "$cache.part" "$cache" || return 1
     rm -rf --one-file-system "$made" "$made.log"
   fi
+  printf '%s\n' "$cache"
+}
+
+# The settings of apt without which the mirrors of this machine do not answer: proxies, and snapshots of old lists.
+apt_settings() {
+  apt-config dump | grep -E '^Acquire::(Check-Valid-Until|Check-Date|http::Proxy|https::Proxy) ' || true
+}
+
+# make_clean_system FOLDER: a minimal Debian 12 that uses the mirrors of this machine.
+make_clean_system() {
+  local base
+  base=$(clean_base)
   mkdir -p "$1"
-  tar -C "$1" -x --zstd -f "$cache"
+  tar -C "$1" -x --zstd -f "$base"
   # The folder that debootstrap filled was one of mktemp, which users other than root may not enter.
   chmod 755 "$1"
   apt_sources >"$1/etc/apt/sources.list"
-  # A mirror may be a snapshot, whose lists have expired.
-  apt-config dump | grep -E '^Acquire::(Check-Valid-Until|Check-Date|http::Proxy|https::Proxy) ' \
-    >"$1/etc/apt/apt.conf.d/90of-the-host" || true
+  apt_settings >"$1/etc/apt/apt.conf.d/90of-the-host"
   cp /etc/resolv.conf "$1/etc/resolv.conf"
   # No service starts in this system.
   printf '#!/bin/sh\nexit 101\n' >"$1/usr/sbin/policy-rc.d"
