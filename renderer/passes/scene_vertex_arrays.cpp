@@ -52,8 +52,8 @@ SceneVertexArrays::SceneVertexArrays(const SceneBuffers& scene, const gl::Buffer
 void SceneVertexArrays::read_nodes(const gl::Buffer& before,
                                    const gl::Buffer& after) const noexcept {
   const auto read = [this](GLuint attribute, GLuint binding, const gl::Buffer& node) {
-    glVertexArrayVertexBuffer(view_.id(), binding, node.id(), 0, 2 * sizeof(float));
-    glVertexArrayAttribFormat(view_.id(), attribute, 2, GL_FLOAT, GL_FALSE, 0);
+    glVertexArrayVertexBuffer(view_.id(), binding, node.id(), 0, kNodeFloats * sizeof(float));
+    glVertexArrayAttribFormat(view_.id(), attribute, kNodeFloats, GL_FLOAT, GL_FALSE, 0);
     glVertexArrayAttribBinding(view_.id(), attribute, binding);
     glEnableVertexArrayAttrib(view_.id(), attribute);
   };
@@ -64,17 +64,18 @@ void SceneVertexArrays::read_nodes(const gl::Buffer& before,
 void SceneVertexArrays::read_twins(const gl::Buffer& before, const gl::Buffer& after,
                                    std::size_t drawn) const noexcept {
   const auto read = [this](GLuint attribute, GLuint binding, const gl::Buffer& node,
-                           std::size_t first) {
+                           std::size_t first, GLint components) {
     glVertexArrayVertexBuffer(view_.id(), binding, node.id(),
-                              static_cast<GLintptr>(first * 2 * sizeof(float)), 2 * sizeof(float));
-    glVertexArrayAttribFormat(view_.id(), attribute, 1, GL_FLOAT, GL_FALSE, 0);
+                              static_cast<GLintptr>(first * kNodeFloats * sizeof(float)),
+                              kNodeFloats * sizeof(float));
+    glVertexArrayAttribFormat(view_.id(), attribute, components, GL_FLOAT, GL_FALSE, 0);
     glVertexArrayAttribBinding(view_.id(), attribute, binding);
     glEnableVertexArrayAttrib(view_.id(), attribute);
   };
-  read(EMIT_ATTR_LOW_BEFORE, 9, before, drawn);
-  read(EMIT_ATTR_LOW_AFTER, 10, after, drawn);
-  read(EMIT_ATTR_HIGH_BEFORE, 11, before, 2 * drawn);
-  read(EMIT_ATTR_HIGH_AFTER, 12, after, 2 * drawn);
+  read(EMIT_ATTR_LOW_BEFORE, 9, before, drawn, 1);
+  read(EMIT_ATTR_LOW_AFTER, 10, after, drawn, 2);
+  read(EMIT_ATTR_HIGH_BEFORE, 11, before, 2 * drawn, 1);
+  read(EMIT_ATTR_HIGH_AFTER, 12, after, 2 * drawn, 2);
 }
 
 void SceneVertexArrays::read_seen(const gl::Buffer& before, const gl::Buffer& after,

@@ -10,6 +10,9 @@ namespace emit::renderer {
 /// context. Real time: the constructor is setup only, the rest is RT-safe.
 class SceneVertexArrays {
  public:
+  /// Components of a sample at a node: temperature offset, bow, share of the sun.
+  static constexpr int kNodeFloats = 3;
+
   SceneVertexArrays(const SceneBuffers& scene, const gl::Buffer& light_records);
   /// Makes the vertex array of the camera's draws current.
   void bind_view() const noexcept { glBindVertexArray(view_.id()); }

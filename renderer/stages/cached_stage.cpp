@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <limits>
@@ -213,6 +214,9 @@ physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
   drawn_ = std::make_unique<DrawnScene>(surface_->take_drawn_scene(), history_of_object_,
                                         surface_->anchors(), clutter_, software_);
   // Allocate the buffers of the samples.
+  static_assert(sizeof(SampleVertex) == SceneVertexArrays::kNodeFloats * sizeof(float) &&
+                offsetof(SampleVertex, bow_k) == sizeof(float) &&
+                offsetof(SampleVertex, sun_frac) == 2 * sizeof(float));
   for (gl::Buffer& node : node_buffers_) {
     node = gl::Buffer::dynamic(surface_->vertices(0).size_bytes());
   }
@@ -343,6 +347,7 @@ void CachedStage::prepare(const FrameRequest& request, CameraSetup& camera,
   // Store the position between the two nodes, and sun and weather.
   drawn_ns_ = request.sim_time_ns;
   frame.node_frac = surface_->fraction();
+  frame.node_bow = bow_shape(frame.node_frac);
   sun_now_ = history_.environment.sun_at(request.thermal_time_ns);
   forcing_now_ = history_.environment.forcing_at(request.thermal_time_ns, sun_now_);
   forcing_now_.environment_k = surface_->surroundings_now_k().value_or(forcing_now_.environment_k);

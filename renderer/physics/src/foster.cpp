@@ -87,12 +87,13 @@ FosterLadder foster_ladder(double dt_s, const FosterNetwork& network) noexcept {
 
 namespace {
 
-/// Advances as foster_advance() does. `gains_at(level)` returns the gains of a level. Lanes that
-/// have converged keep their result while others go on.
+/// Advances as foster_advance() does. `gains_at(level)` returns the gains of a level. `bow_k` takes
+/// FosterAdvance::bow_k. Lanes that have converged keep their result while others go on.
 template <std::size_t kModes, class Real, class GainsAt>
 FosterAdvance advance_controlled(FosterState<Real>& x, const FosterDrive<Real>& begin,
                                  const FosterDrive<Real>& end, const GainsAt& gains_at,
-                                 const FosterSurface<Real>& surface, double tolerance_k) noexcept {
+                                 const FosterSurface<Real>& surface, double tolerance_k,
+                                 Real& bow_k) noexcept {
   using std::abs;
   FosterAdvance result;
   // Start with one step, then halve the steps until the result stops moving.
@@ -104,16 +105,20 @@ FosterAdvance advance_controlled(FosterState<Real>& x, const FosterDrive<Real>& 
     const int steps = 1 << level;
     FosterState<Real> fine = start;
     FosterDrive<Real> from = begin;
+    Real middle_k = Real(0.0);
     for (int i = 1; i <= steps; ++i) {
       const FosterDrive<Real> to =
           i == steps ? end : lerp(begin, end, Real(static_cast<double>(i) / steps));
       clamped = either(foster_step<kModes>(fine, from, to, gains, surface), clamped);
       from = to;
+      if (2 * i == steps) middle_k = foster_offset_k<kModes>(fine, surface);
     }
+    const Real end_k = foster_offset_k<kModes>(fine, surface);
+    bow_k = choose(moves, middle_k - Real(0.5) * (foster_offset_k<kModes>(start, surface) + end_k),
+                   bow_k);
     // Compare with the coarser result. Step doubling of a second-order scheme leaves a third of the
     // change as error.
-    Real change_k =
-        abs(foster_offset_k<kModes>(fine, surface) - foster_offset_k<kModes>(x, surface));
+    Real change_k = abs(end_k - foster_offset_k<kModes>(x, surface));
     for (std::size_t i = 0; i < kModes; ++i) {
       const Real mode_k = abs(fine[i] - x[i]);
       change_k = choose(Mask<Real>(change_k < mode_k), mode_k, change_k);
@@ -172,9 +177,11 @@ template <class Lanes, std::size_t kModes>
     }
     return gains;
   };
+  Lanes bow_k = Lanes(0.0);
   advance_controlled<kModes>(x, drive(&FosterLane::begin), drive(&FosterLane::end), gains_at,
-                             surface, tolerance_k);
+                             surface, tolerance_k, bow_k);
   for (std::size_t l = 0; l < kFosterLanes; ++l) {
+    if (lanes[l]->bow_k != nullptr) *lanes[l]->bow_k = bow_k[l];
     for (std::size_t i = 0; i < kModes; ++i) (*lanes[l]->x)[i] = x[i][l];
   }
 }
@@ -184,9 +191,12 @@ template <class Lanes, std::size_t kModes>
 FosterAdvance foster_advance(FosterState<double>& x, const FosterDrive<double>& begin,
                              const FosterDrive<double>& end, const FosterLadder& ladder,
                              const FosterSurface<double>& surface, double tolerance_k) noexcept {
-  return advance_controlled<kMaxFosterModes>(
+  double bow_k = 0.0;
+  FosterAdvance result = advance_controlled<kMaxFosterModes>(
       x, begin, end, [&](std::size_t level) -> const auto& { return ladder.level[level]; }, surface,
-      tolerance_k);
+      tolerance_k, bow_k);
+  result.bow_k = bow_k;
+  return result;
 }
 
 namespace {
@@ -238,7 +248,9 @@ void foster_advance_all(std::span<const FosterLane> lanes, double tolerance_k) n
     lanes = lanes.subspan(count);
   }
   for (const FosterLane& lane : lanes) {
-    foster_advance(*lane.x, lane.begin, lane.end, *lane.ladder, lane.surface, tolerance_k);
+    const FosterAdvance result =
+        foster_advance(*lane.x, lane.begin, lane.end, *lane.ladder, lane.surface, tolerance_k);
+    if (lane.bow_k != nullptr) *lane.bow_k = result.bow_k;
   }
 }
 

@@ -22,16 +22,16 @@ layout(location = EMIT_ATTR_SEEN_AFTER) in vec4 seen_after;
 #endif
 // Mean radiance that arrives from everything but the sun, by band, W m-2 sr-1.
 out EMIT_BANDS_VEC incoming_w_m2_sr;
-// State of the sample at the node of time before the frame and at the node after it: temperature offset in K, visible
-// share of the sun.
-layout(location = EMIT_ATTR_NODE_BEFORE) in vec2 node_before;
-layout(location = EMIT_ATTR_NODE_AFTER) in vec2 node_after;
+// State of the sample at the node of time before the frame and at the node after it: temperature offset and bow of the
+// interval before the node in K, visible share of the sun.
+layout(location = EMIT_ATTR_NODE_BEFORE) in vec3 node_before;
+layout(location = EMIT_ATTR_NODE_AFTER) in vec3 node_after;
 #ifdef EMIT_CLUTTER
-// Temperature offsets in K of the twins of the sample, at the same nodes.
+// Temperature offsets of the twins of the sample at the same nodes, and bow at the node after the frame, in K.
 layout(location = EMIT_ATTR_LOW_BEFORE) in float low_before;
-layout(location = EMIT_ATTR_LOW_AFTER) in float low_after;
+layout(location = EMIT_ATTR_LOW_AFTER) in vec2 low_after;
 layout(location = EMIT_ATTR_HIGH_BEFORE) in float high_before;
-layout(location = EMIT_ATTR_HIGH_AFTER) in float high_after;
+layout(location = EMIT_ATTR_HIGH_AFTER) in vec2 high_after;
 // Place in the field, in tiles, and the change of the temperature in K per standard deviation and per its square.
 out vec3 tile_position;
 out vec2 clutter_k;
@@ -53,6 +53,13 @@ out vec3 normal_relworld;
 out vec3 normal_relworld;
 #endif
 
+#ifdef EMIT_CACHED
+// Returns the temperature offset of a sample between the nodes (physics.md eq. 85). `after` has its offset and its bow.
+float offset_now_k(float before_k, vec2 after_k) {
+  return mix(before_k, after_k.x, frame.node_frac) + frame.node_bow * after_k.y;
+}
+#endif
+
 void main() {
   // Turn the normal into relworld axes.
   vec3 n = draw.normal_from_mesh[0].xyz * normal_mesh.x + draw.normal_from_mesh[1].xyz * normal_mesh.y +
@@ -61,11 +68,11 @@ void main() {
   // Interpolate the state of the sample between the two nodes of time.
   float per_length = inversesqrt(max(dot(n, n), 1e-30));
   float cosine = dot(n, frame.to_sun) * per_length * frame.sun_up;
-  vec2 now = mix(node_before, node_after, frame.node_frac);
+  vec2 now = vec2(offset_now_k(node_before.x, node_after.xy), mix(node_before.z, node_after.z, frame.node_frac));
 #ifdef EMIT_CLUTTER
   // Put a parabola through the sample and its twins.
-  float low = mix(low_before, low_after, frame.node_frac) - now.x;
-  float high = mix(high_before, high_after, frame.node_frac) - now.x;
+  float low = offset_now_k(low_before, low_after) - now.x;
+  float high = offset_now_k(high_before, high_after) - now.x;
   clutter_k = draw.twins * 0.5 *
               vec2((high - low) / EMIT_CLUTTER_TWIN_SD, (high + low) / (EMIT_CLUTTER_TWIN_SD * EMIT_CLUTTER_TWIN_SD));
   vec4 at_mesh = vec4(position_mesh_m, 1.0);

@@ -38,7 +38,7 @@ struct FrameParams {
   float moon_radius_px;       // 0: the moon is out of view
   vec2 moon_at_px;
   float moon_sun_au;          // distance of the moon from the sun
-  float unused0;
+  float node_bow;             // cached: share that the frame takes of the samples' bow between the nodes
   vec3 moon_to_sun;           // unit vector: right and down in the image, then towards the camera
   float unused1;
 };

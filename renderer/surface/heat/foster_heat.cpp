@@ -430,11 +430,13 @@ void FosterHeat::advance_group(std::span<SampleAdvance> group,
   std::array<physics::FosterLane, most> lanes;
   std::size_t count = 0;
   for (std::size_t i = 0; i < group.size(); ++i) {
-    const SampleAdvance& each = group[i];
+    SampleAdvance& each = group[i];
+    each.bow_k = 0.0;
     ends[i] = incoming(*each.sample, each.normal, at_end, each.drive, each.drive.longwave_end_w_m2);
     if (materials_[each.sample->material].prescribed()) continue;
     const FilmSpan film = film_over(each, interval.forcing);
     if (begin_advance(each, interval, ends[i], film, lanes[count])) {
+      lanes[count].bow_k = &each.bow_k;
       end_drives[i] = lanes[count++].end;
     }
   }

@@ -132,6 +132,7 @@ struct SampleAdvance {
   SampleState* state = nullptr;     ///< at the begin of the interval, then at its end
   const SheetBack* back = nullptr;  ///< other face of a sheet; null for all other samples
   SampleOutput output;              ///< at the end of the interval
+  double bow_k = 0.0;               ///< see SampleVertex
 };
 /// Number of samples that are best advanced together.
 inline constexpr std::size_t kAdvanceTogether = physics::kFosterLanes;
@@ -142,6 +143,8 @@ struct HeatInterval {
   using Relaxation = std::array<physics::RelaxationGains<double>, kMaxRelaxationModes>;
 
   IntervalForcing forcing;
+  /// The host has changed the weather at its begin or shortly before: then temperatures have a bow.
+  bool after_weather = false;
   EntityForcing entities;
   std::vector<physics::FosterLadder> ladders;  ///< gains of the model foster
   std::vector<Relaxation> relaxation;          ///< gains of the model emit2014

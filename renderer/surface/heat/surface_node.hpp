@@ -16,8 +16,25 @@ namespace emit::renderer {
 /// over the surface and between nodes.
 struct SampleVertex {
   float offset_k = 0.0F;  ///< temperature from the reference temperature
+  /// Temperature in the middle of the interval that ends at the node, from the mean of both ends.
+  /// It is 0 where the interval does not follow a sudden change.
+  float bow_k = 0.0F;
   float sun_frac = 0.0F;  ///< visible share of the sun's disc
 };
+
+/// Shape of a temperature between two nodes, from the line between them, 1 in the middle. `frac` is
+/// the place in the interval, 0 to 1. The shape lies between those of a constant curvature and of
+/// the square root of time, which ground follows after a sudden change (physics.md eq. 85).
+[[nodiscard]] constexpr float bow_shape(float frac) noexcept {
+  constexpr float kRise = 0.4F;
+  return (2.0F + 4.0F * kRise) * frac * (1.0F - frac) / (frac + kRise);
+}
+/// Returns the temperature offset of a vertex at a place in the interval, 0 to 1.
+[[nodiscard]] constexpr float offset_between_k(const SampleVertex& before,
+                                               const SampleVertex& after, float frac) noexcept {
+  return before.offset_k + frac * (after.offset_k - before.offset_k) +
+         bow_shape(frac) * after.bow_k;
+}
 
 /// Record of the parts of a list that have changed, as a bounded number of ranges that together
 /// hold them. Everything but the constructor is RT-safe.
@@ -142,6 +159,25 @@ template <class T>
         &SampleOutput::shortwave_out_w_m2}) {
     out.*value = between(a.*value, b.*value, frac);
   }
+  return out;
+}
+
+/// State and output of a sample at one instant.
+struct SampleInstant {
+  SampleState state;
+  SampleOutput output;
+};
+/// Returns a sample at a place between two nodes, 0 to 1. What the bow of its vertex adds to the
+/// temperature is put into the fastest mode, which causes most of it and forgets it first.
+[[nodiscard]] inline SampleInstant sample_between(const SurfaceNode& before,
+                                                  const SurfaceNode& after, std::uint32_t sample,
+                                                  std::uint32_t vertex, double frac) noexcept {
+  SampleInstant out{between(before.states[sample], after.states[sample], frac),
+                    between(before.outputs[sample], after.outputs[sample], frac)};
+  if (vertex == kNoSample) return out;
+  const float bow_k = bow_shape(static_cast<float>(frac)) * after.vertices[vertex].bow_k;
+  out.state.modes_k[0] += static_cast<double>(bow_k);
+  out.output.offset_k += bow_k;
   return out;
 }
 

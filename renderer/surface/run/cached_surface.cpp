@@ -201,7 +201,7 @@ void CachedSurface::fill_first_vertices(bool clouds) {
   for (std::uint32_t i = 0; i < all.size(); ++i) {
     if (all[i].vertex == kNoSample) continue;
     const bool moves = clouds || (geometry_.entities() != 0 && all[i].entity < 0);
-    first.vertices[all[i].vertex] = {first.outputs[i].offset_k,
+    first.vertices[all[i].vertex] = {first.outputs[i].offset_k, 0.0F,
                                      nodes_[moves ? 1 : 0].outputs[i].sun_frac};
   }
 }

@@ -126,8 +126,7 @@ class CachedSurface {
     return interval_.columns_left_k() > kMostColumnErrorK;
   }
   static constexpr double kMostColumnErrorK = 0.05;
-  /// Number of blocks of samples that do not follow the intervals, because the host moves an
-  /// entity. @pre prepare()
+  /// Number of blocks of samples that do not follow the intervals (LocalSteps). @pre prepare()
   [[nodiscard]] std::size_t local_blocks() const noexcept {
     EMIT_CHECK(local_.has_value());
     return local_->active();
@@ -165,7 +164,9 @@ class CachedSurface {
   }
   /// Output of a sample at the time of the latest advance(). @pre prepare(); sample < samples
   [[nodiscard]] SampleOutput output_now(std::uint32_t sample) const noexcept {
-    return between(nodes_[0].outputs[sample], nodes_[1].outputs[sample], fraction_);
+    return sample_between(nodes_[0], nodes_[1], sample, model().samples.samples[sample].vertex,
+                          static_cast<double>(fraction_))
+        .output;
   }
   /// Mean net flux into the solid at a sample, W/m2, over the interval of the latest advance(). NaN
   /// where no flux drives the heat: with emit2014 and prescribed temperatures.

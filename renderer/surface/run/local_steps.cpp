@@ -17,6 +17,10 @@ constexpr std::int64_t kMaxStepNs = 1'250'000'000;
 /// Distance and turn from the foreseen pose within which an entity's shade counts as foreseen.
 constexpr double kForeseenM = 0.05;
 constexpr double kForeseenRad = 5e-3;
+/// Turn within an interval from which an entity's own samples take steps of their own, because an
+/// interval knows one attitude. Up to it, direct sunlight on a face is off by a tenth of that on a
+/// face towards the sun at most.
+constexpr double kTurnedRad = 0.1;
 constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
 
 /// Place of an instant between two nodes: 0 at `before`, 1 at `after`.
@@ -56,7 +60,7 @@ void draw_line(std::uint32_t vertex, std::int64_t at_ns, float offset_k, std::in
   const auto at_node = [&](const SurfaceNode& node) {
     return SampleVertex{static_cast<float>(static_cast<double>(offset_k) +
                                            slope_k_ns * static_cast<double>(node.at_ns - at_ns)),
-                        end.sun_frac};
+                        0.0F, end.sun_frac};
   };
   window.before.vertices[vertex] = at_node(window.before);
   window.after.vertices[vertex] = at_node(window.after);
@@ -85,6 +89,11 @@ LocalSteps::LocalSteps(const SurfaceSamples& all, const Setup& setup, const Inte
   interval_.entities.airs.resize(setup.entities);
   for (const PartHistory& part : setup.parts) {
     part_blocks_.push_back(blocks_of(part, blocks_, all));
+  }
+  entity_blocks_.resize(setup.entities);
+  for (std::uint32_t b = 0; b < blocks_.blocks().size(); ++b) {
+    const std::int32_t entity = blocks_.blocks()[b].entity;
+    if (entity >= 0) entity_blocks_[static_cast<std::size_t>(entity)].push_back(b);
   }
   for (auto& known : known_) known.resize(setup.entities);
   for (auto& entities : foreseen_) entities.resize(setup.entities);
@@ -151,6 +160,21 @@ void LocalSteps::look_around(std::int64_t at_ns, const Window& window,
                          EntityPoses::as_known(inputs.entities, known_[0]), inputs.origin_world_m);
     }
     want(m, known_rays_, at_ns);
+  }
+  // Find the entities that turn within the interval, by the script too.
+  for (std::size_t m = 0; m < inputs.entities.size(); ++m) {
+    if (entity_blocks_[m].empty()) continue;
+    const PoseHistory& entity = inputs.entities[m];
+    const TrajectoryState now = entity.at(at_ns);
+    const auto turned = [&](std::int64_t other_ns) {
+      constexpr double kAnywhereM = std::numeric_limits<double>::infinity();
+      return !physics::close(now.pose, entity.at(other_ns).pose, kAnywhereM, kTurnedRad);
+    };
+    if (!now.on || !(turned(window.before.at_ns) || turned(at_ns - step_ns_) ||
+                     turned(at_ns + step_ns_) || turned(window.after.at_ns))) {
+      continue;
+    }
+    for (const std::uint32_t b : entity_blocks_[m]) want_block(b, at_ns);
   }
   // Find the parts whose heat changes now or within the step ahead.
   for (std::size_t p = 0; p < part_blocks_.size(); ++p) {
@@ -236,8 +260,13 @@ void LocalSteps::begin_alone(std::uint32_t block, std::int64_t at_ns, const Wind
   // Interpolate its states along the interval.
   each_sample(block, all, [&](std::uint32_t i) {
     own_clock_[i] = 1;
-    window.before.states[i] = between(window.before.states[i], window.after.states[i], frac);
-    window.before.outputs[i] = between(window.before.outputs[i], window.after.outputs[i], frac);
+    const SampleInstant at =
+        sample_between(window.before, window.after, i, all.samples[i].vertex, frac);
+    window.before.states[i] = at.state;
+    window.before.outputs[i] = at.output;
+    // Keep the solution of a renewal from this sample: it began without a clock of its own.
+    const std::uint32_t column = all.samples[i].column;
+    if (window.renewing && column != kNoSample) window.stepped_again[column] = 1;
   });
 }
 
@@ -270,8 +299,8 @@ void LocalSteps::step(std::span<const std::uint32_t> blocks, std::uint32_t end,
     });
     for (std::size_t k = 0; k < batch_.size(); ++k) {
       const std::uint32_t behind = inputs.step.all.samples[batch_[k]].other_side;
-      keep(batch_[k], stepped_[k].state, stepped_[k].output);
-      if (behind != kNoSample) keep(behind, stepped_[k].state, stepped_[k].behind);
+      keep(batch_[k], stepped_[k], stepped_[k].output);
+      if (behind != kNoSample) keep(behind, stepped_[k], stepped_[k].behind);
     }
     batch_.clear();
   };
@@ -317,8 +346,8 @@ void LocalSteps::bring(std::span<const std::uint32_t> blocks, std::int64_t to_ns
     }
     prepare(from_ns, to_ns, window, inputs);
     step(chosen_, std::numeric_limits<std::uint32_t>::max(), window.before, rays_, interval_,
-         inputs, [&](std::uint32_t i, const SampleState& state, const SampleOutput& output) {
-           window.before.states[i] = state;
+         inputs, [&](std::uint32_t i, const SteppedSample& stepped, const SampleOutput& output) {
+           window.before.states[i] = stepped.state;
            window.before.outputs[i] = output;
          });
     for (const std::uint32_t b : chosen_) at_ns_[b] = to_ns;
@@ -331,10 +360,10 @@ void LocalSteps::show(std::span<const std::uint32_t> blocks, std::size_t turn, s
   const std::int64_t end_ns = at_ns + step_ns_;
   prepare(at_ns, end_ns, window, inputs);
   step(blocks, std::numeric_limits<std::uint32_t>::max(), window.before, rays_, interval_, inputs,
-       [&](std::uint32_t i, const SampleState& state, const SampleOutput& output) {
+       [&](std::uint32_t i, const SteppedSample& stepped, const SampleOutput& output) {
          draw_line(inputs.step.all.samples[i].vertex, at_ns, window.before.outputs[i].offset_k,
                    end_ns, output, window);
-         window.after.states[i] = state;
+         window.after.states[i] = stepped.state;
          window.after.outputs[i] = output;
        });
   // Note the poses that the step ahead was made with.
@@ -365,22 +394,22 @@ void LocalSteps::hand_back(std::span<const std::uint32_t> blocks, std::int64_t a
   // Advance the blocks over the rest of the interval.
   prepare(at_ns, window.after.at_ns, window, inputs);
   step(blocks, std::numeric_limits<std::uint32_t>::max(), window.before, rays_, interval_, inputs,
-       [&](std::uint32_t i, const SampleState& state, const SampleOutput& output) {
+       [&](std::uint32_t i, const SteppedSample& stepped, const SampleOutput& output) {
          draw_line(inputs.step.all.samples[i].vertex, at_ns, window.before.outputs[i].offset_k,
                    window.after.at_ns, output, window);
-         window.after.states[i] = state;
+         window.after.states[i] = stepped.state;
          window.after.outputs[i] = output;
        });
   // Repeat the part of the next interval that is computed already: it began without these states.
   step(blocks, window.done, window.after, window.next_rays, window.next_interval, inputs,
-       [&](std::uint32_t i, const SampleState& state, const SampleOutput& output) {
-         window.next.states[i] = state;
+       [&](std::uint32_t i, const SteppedSample& stepped, const SampleOutput& output) {
+         window.next.states[i] = stepped.state;
          window.next.outputs[i] = output;
          const std::uint32_t column = inputs.step.all.samples[i].column;
          if (column != kNoSample) window.stepped_again[column] = 1;
          const std::uint32_t vertex = inputs.step.all.samples[i].vertex;
          if (vertex == kNoSample) return;
-         window.next.vertices[vertex] = {output.offset_k, output.sun_frac};
+         window.next.vertices[vertex] = {output.offset_k, stepped.bow_k, output.sun_frac};
          window.next.changes.add(vertex, 1);
        });
   for (const std::uint32_t b : blocks) {
@@ -424,7 +453,7 @@ void LocalSteps::rotated(const Window& window, const SurfaceSamples& all) noexce
         if (vertex == kNoSample) return;
         const SampleVertex& now = window.before.vertices[vertex];
         const float way_k = now.offset_k - old.vertices[vertex].offset_k;
-        window.after.vertices[vertex] = {now.offset_k + ways * way_k, now.sun_frac};
+        window.after.vertices[vertex] = {now.offset_k + ways * way_k, 0.0F, now.sun_frac};
         window.after.changes.add(vertex, 1);
       });
     }

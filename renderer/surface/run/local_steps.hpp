@@ -19,8 +19,8 @@
 
 namespace emit::renderer {
 
-/// Short time steps of the samples near entities that the host drives, and of parts whose heat
-/// changes.
+/// Short time steps of the samples near entities that the host drives, of entities that turn, and
+/// of parts whose heat changes.
 ///
 /// The rays of an interval are sent before it begins, with the poses known then. If an entity
 /// departs from these poses, three sets of samples leave the interval in blocks: its own, those
@@ -28,9 +28,10 @@ namespace emit::renderer {
 /// block over the time that has passed, with the poses that came. It then advances the block one
 /// step ahead with foreseen poses, for the frames to show. If poses came as foreseen, the step
 /// ahead counts and is not done again. A block returns to the interval, over the rest of it, when
-/// no such entity is near any more. Samples of a part are on their own too while a command begins
-/// to act or the temperature behind their skin moves. Blocks take turns, so that no frame advances
-/// all of them.
+/// no such entity is near any more. The samples of an entity are on their own too while it turns,
+/// by the script as well: an interval knows one attitude. So are those of a part while a command
+/// begins to act or the temperature behind their skin moves. Blocks take turns, so that no frame
+/// advances all of them.
 ///
 /// Node `before` holds the states of a block on its own at the end of its latest step, and `after`
 /// holds the states foreseen at the end of the next step. The vertices of both nodes lie on
@@ -67,7 +68,8 @@ class LocalSteps {
     /// The flag is true while `after` is being computed anew: then values between it and `before`
     /// do not hold.
     bool renewing = false;
-    /// Flags by column, to be set for samples of `next` that are stepped again.
+    /// Flags by column of the node that is being computed, to be set for samples that are stepped
+    /// otherwise.
     std::span<std::uint8_t> stepped_again;
     const IntervalRays& next_rays;
     const HeatInterval& next_interval;
@@ -115,7 +117,8 @@ class LocalSteps {
   /// A block follows its interval, is about to leave it, or is on its own.
   enum class State : std::uint8_t { of_interval, wanted, on_its_own };
 
-  /// Finds the blocks that entities touch which have departed from the known poses.
+  /// Finds the blocks that entities touch which have departed from the known poses, and those of
+  /// entities that turn and of parts that change.
   void look_around(std::int64_t at_ns, const Window& window, const Inputs& inputs) noexcept;
   /// Advances a group of blocks to `at_ns`. It then does the step ahead, or returns blocks to the
   /// interval.
@@ -172,6 +175,7 @@ class LocalSteps {
   std::array<std::vector<TrajectoryState>, kTurns> foreseen_;
   std::array<std::uint64_t, kTurns> foreseen_parts_{};   ///< by turn: commands that were known then
   std::vector<std::vector<std::uint32_t>> part_blocks_;  ///< by part: blocks with samples of it
+  std::vector<std::vector<std::uint32_t>> entity_blocks_;  ///< by entity: its own blocks
   /// Flag of each entity: 1 once the blocks that it was to shade in this interval are found.
   std::vector<std::uint8_t> known_found_;
   std::vector<std::uint8_t> own_clock_;                   ///< by sample: has_own_clock()

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "emit/physics/check.hpp"
+#include "surface/run/node_grid.hpp"
 
 namespace emit::renderer {
 
@@ -24,6 +25,15 @@ constexpr double kHeatFrac = 0.85;
 std::size_t due(double passed_frac, std::size_t count) noexcept {
   return static_cast<std::size_t>(
       std::ceil(std::clamp(passed_frac, 0.0, 1.0) * static_cast<double>(count)));
+}
+
+/// Returns true if the host has changed the weather at an instant or within the time before it in
+/// which ground answers along a curve.
+bool weather_changed(std::int64_t at_ns, const Environment& environment) noexcept {
+  constexpr std::int64_t kAnswerNs = 30'000'000'000;
+  const std::span<const std::int64_t> changes_ns = environment.changes_ns();
+  const auto after = std::ranges::upper_bound(changes_ns, at_ns + NodeGrid::kSameNs);
+  return after != changes_ns.begin() && at_ns - *(after - 1) <= kAnswerNs;
 }
 
 }  // namespace
@@ -71,6 +81,7 @@ void SurfaceInterval::begin(const SurfaceNode& from, SurfaceNode& to, const Surf
   // Fill the forcing, which also advances the surroundings to the end of the interval.
   history.restore_surroundings(from.surroundings);
   interval_.forcing = history.extend(from.at_ns, to.at_ns, inputs.environment);
+  interval_.after_weather = weather_changed(from.at_ns, inputs.environment);
   interval_.entities.update(inputs.parts, inputs.entities, interval_.forcing, from.at_ns, to.at_ns);
   to.forcing = interval_.forcing;
   to.surroundings = history.surroundings();
@@ -145,11 +156,13 @@ void SurfaceInterval::advance_samples(const SurfaceNode& from, SurfaceNode& to, 
   if (end <= first) return;
   SurfaceStep step = this->step(all);
   step.columns = &*columns_;
-  const auto keep = [&](std::size_t i, const SampleState& state, const SampleOutput& output) {
-    to.states[i] = state;
+  const auto keep = [&](std::size_t i, const SteppedSample& stepped, const SampleOutput& output) {
+    to.states[i] = stepped.state;
     to.outputs[i] = output;
     const std::uint32_t vertex = all.samples[i].vertex;
-    if (vertex != kNoSample) to.vertices[vertex] = {output.offset_k, output.sun_frac};
+    if (vertex != kNoSample) {
+      to.vertices[vertex] = {output.offset_k, stepped.bow_k, output.sun_frac};
+    }
   };
   // Step the samples on all cores.
   workers.run(end - first, kSamplesPerTask, [&](std::size_t task_begin, std::size_t task_end) {
@@ -158,9 +171,9 @@ void SurfaceInterval::advance_samples(const SurfaceNode& from, SurfaceNode& to, 
       if (!steps_itself(all, i) || (skipped != nullptr && skipped->has_own_clock(i))) continue;
       stepped.state = from.states[i];
       step_sample(step, rays_, interval_, {from.states, from.outputs}, i, stepped);
-      keep(i, stepped.state, stepped.output);
+      keep(i, stepped, stepped.output);
       const std::uint32_t behind = all.samples[i].other_side;
-      if (behind != kNoSample) keep(behind, stepped.state, stepped.behind);
+      if (behind != kNoSample) keep(behind, stepped, stepped.behind);
     }
   });
   done_ = end;

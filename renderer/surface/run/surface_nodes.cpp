@@ -49,7 +49,8 @@ void SurfaceNodes::cut(std::int64_t event_ns, std::int64_t end_ns, const LocalSt
     return static_cast<double>(at_ns - first.at_ns) /
            static_cast<double>(second.at_ns - first.at_ns);
   };
-  // Move states, outputs and vertices of each sample along the line between the nodes.
+  // Move states, outputs and vertices of each sample along their course between the nodes, and past
+  // its end along the line.
   const double frac = fraction_at(event_ns);
   const double end_frac = fraction_at(end_ns);
   const std::size_t bands =
@@ -60,16 +61,19 @@ void SurfaceNodes::cut(std::int64_t event_ns, std::int64_t end_ns, const LocalSt
     }
     for (auto i = static_cast<std::uint32_t>(begin); i < end; ++i) {
       if (frac > 0.0 && !local.has_own_clock(i)) {
-        first.states[i] = between(first.states[i], second.states[i], frac);
-        first.outputs[i] = between(first.outputs[i], second.outputs[i], frac);
+        const SampleInstant at = sample_between(first, second, i, all.samples[i].vertex, frac);
+        first.states[i] = at.state;
+        first.outputs[i] = at.output;
       }
       const std::uint32_t vertex = all.samples[i].vertex;
       if (vertex == kNoSample) continue;
       const SampleVertex from = first.vertices[vertex];
       SampleVertex& to = second.vertices[vertex];
-      first.vertices[vertex] = {between(from.offset_k, to.offset_k, frac),
+      first.vertices[vertex] = {offset_between_k(from, to, static_cast<float>(frac)), 0.0F,
                                 between(from.sun_frac, to.sun_frac, frac)};
-      to.offset_k = between(from.offset_k, to.offset_k, end_frac);
+      to.offset_k = end_frac < 1.0 ? offset_between_k(from, to, static_cast<float>(end_frac))
+                                   : between(from.offset_k, to.offset_k, end_frac);
+      to.bow_k = 0.0F;
     }
   });
   first.surroundings = between(first.surroundings, second.surroundings, frac);

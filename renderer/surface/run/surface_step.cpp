@@ -215,8 +215,17 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
       drive.aside.beside = &beside;
     }
   }
+  const auto advance = [&](const SheetBack* back) {
+    SampleAdvance one{&sample, normal, drive, &stepped.state, back, {}};
+    step.heat.advance_all({&one, 1}, interval);
+    stepped.output = one.output;
+    // What drives a sample is smooth while nothing changes suddenly: its steps between intervals
+    // are those of the rays then. The shade of an entity comes at any time of the interval.
+    const bool sudden = interval.after_weather && sun.frac == sun.fixed_frac;
+    stepped.bow_k = sudden ? static_cast<float>(one.bow_k) : 0.0F;
+  };
   if (sample.other_side == kNoSample) {
-    stepped.output = step.heat.advance(sample, normal, interval, drive, stepped.state);
+    advance(nullptr);
     stepped.output.offset_k += static_cast<float>(twin_change_k);
     // Show the sun that static geometry leaves, because frames have their own shade of entities.
     stepped.output.sun_frac = sun.fixed_frac;
@@ -229,7 +238,7 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
   const SampleDrive back_drive = drive_of(step, interval_rays, interval.entities, begin.outputs,
                                           viewed_behind, offsets, sun_behind);
   const SheetBack back{behind, back_drive};
-  stepped.output = step.heat.advance(sample, normal, interval, drive, stepped.state, &back);
+  advance(&back);
   stepped.behind =
       step.heat.output(behind, -normal, interval.forcing.end, back_drive, stepped.state);
   stepped.output.sun_frac = sun.fixed_frac;

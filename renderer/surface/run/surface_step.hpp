@@ -37,6 +37,7 @@ struct SurfaceStep {
 /// state.
 struct SteppedSample {
   SampleState state;
+  float bow_k = 0.0F;  ///< see SampleVertex
   SampleOutput output;
   SampleOutput behind;
 };

@@ -351,6 +351,35 @@ TEST(Relaxation, SplittingALinearStepAThousandTimesMovesNothing) {
   }
 }
 
+TEST(FosterAdvance, tells_the_bow_of_the_temperature) {
+  // Expect the temperature of two halves of the interval in the middle of the whole one, minus the
+  // mean of its ends, for ground on which the sun begins to shine.
+  FosterNetwork network;
+  network = {{{{4.0, 0.004}, {60.0, 0.01}, {1800.0, 0.05}, {2e5, 0.6}}}, 4};
+  const FosterSurface<double> surface = foster_surface(network, 0.95, 288.0, 288.15);
+  const FosterDrive<double> begin{1100.0, 15.0, 5.0};
+  for (const double dt_s : {0.5, 5.0, 20.0, 300.0}) {
+    for (const double later_w_m2 : {1100.0, 300.0}) {
+      const FosterDrive<double> end{later_w_m2, 12.0, 6.0};
+      constexpr double kToleranceK = 1e-4;
+      FosterState<double> whole{};
+      const FosterAdvance told =
+          foster_advance(whole, begin, end, foster_ladder(dt_s, network), surface, kToleranceK);
+      FosterState<double> half{};
+      const FosterDrive<double> middle = lerp(begin, end, 0.5);
+      const FosterLadder halves = foster_ladder(0.5 * dt_s, network);
+      foster_advance(half, begin, middle, halves, surface, kToleranceK);
+      const double middle_k = foster_offset_k(half, surface);
+      foster_advance(half, middle, end, halves, surface, kToleranceK);
+      const double end_k = foster_offset_k(half, surface);
+      const double expected_k =
+          middle_k - 0.5 * (foster_offset_k(FosterState<double>{}, surface) + end_k);
+      EXPECT_NEAR(told.bow_k, expected_k, 1e-3) << dt_s << " s";
+      EXPECT_GT(told.bow_k, 0.0) << dt_s << " s";
+    }
+  }
+}
+
 /// Surfaces that differ in everything, so that they need different splits of the interval.
 TEST(FosterLanes, have_the_bits_of_single_surfaces) {
   std::mt19937_64 random(11);
@@ -372,6 +401,8 @@ TEST(FosterLanes, have_the_bits_of_single_surfaces) {
       std::vector<FosterState<double>> single(count);
       std::vector<FosterState<double>> together;
       std::vector<FosterLane> lanes(count);
+      std::vector<double> bows_k(count, -1.0);
+      std::vector<double> single_bows_k(count);
       for (std::size_t i = 0; i < count; ++i) {
         const std::size_t kind = i % (count % 2 == 0 ? 3 : 2);
         for (std::size_t m = 0; m < networks[kind].count; ++m) single[i][m] = number(-20.0, 30.0);
@@ -387,11 +418,17 @@ TEST(FosterLanes, have_the_bits_of_single_surfaces) {
       together = single;
       for (std::size_t i = 0; i < count; ++i) {
         lanes[i].x = &together[i];
-        foster_advance(single[i], lanes[i].begin, lanes[i].end, *lanes[i].ladder, lanes[i].surface,
-                       0.02);
+        // Some lanes ask for no bow.
+        if (i % 3 != 1) lanes[i].bow_k = &bows_k[i];
+        single_bows_k[i] = foster_advance(single[i], lanes[i].begin, lanes[i].end, *lanes[i].ladder,
+                                          lanes[i].surface, 0.02)
+                               .bow_k;
       }
       foster_advance_all(lanes, 0.02);
       for (std::size_t i = 0; i < count; ++i) {
+        EXPECT_EQ(std::bit_cast<std::uint64_t>(bows_k[i]),
+                  std::bit_cast<std::uint64_t>(lanes[i].bow_k == nullptr ? -1.0 : single_bows_k[i]))
+            << dt_s << " s, " << count << " surfaces, surface " << i;
         // States that a network does not have are not defined where the balance was clamped.
         for (std::size_t m = 0; m < lanes[i].ladder->modes; ++m) {
           EXPECT_EQ(std::bit_cast<std::uint64_t>(together[i][m]),

@@ -119,8 +119,8 @@ TEST(RendererCachedBreaks, ShadeOfAPassingBodyIsItsMeanOverTheInterval) {
       constexpr double kHalfS = kHalfLengthM / kSpeedMs;
       const double expected_k =
           open_ground_k(scenario, now_ns, Shade{middle_s - kHalfS, middle_s + kHalfS});
-      EXPECT_NEAR(track_k[column], expected_k, 0.1) << seconds << " s, " << x_m << " m";
-      EXPECT_LT(track_k[column], open_k - 0.12) << seconds << " s, " << x_m << " m";
+      EXPECT_NEAR(track_k[column], expected_k, 0.06) << seconds << " s, " << x_m << " m";
+      EXPECT_LT(track_k[column], open_k - 0.15) << seconds << " s, " << x_m << " m";
     }
   };
   {

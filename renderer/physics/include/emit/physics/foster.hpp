@@ -317,7 +317,10 @@ struct FosterLadder {
 /// Outcome of foster_advance().
 struct FosterAdvance {
   double error_k = 0.0;  ///< estimated error of the temperature at the end of the interval, K
-  int level = 0;         ///< the interval was split into 2^level steps
+  /// Bow of the temperature: its value in the middle of the interval minus the mean of those at
+  /// both ends, K.
+  double bow_k = 0.0;
+  int level = 0;  ///< the interval was split into 2^level steps
   bool clamped = false;
 };
 
@@ -339,6 +342,7 @@ struct FosterLane {
   FosterDrive<double> end;
   const FosterLadder* ladder = nullptr;
   FosterSurface<double> surface;
+  double* bow_k = nullptr;  ///< takes FosterAdvance::bow_k; null: it is not wanted
 };
 
 /// Advances each surface as foster_advance() does, bit for bit, in less time: a step waits for
