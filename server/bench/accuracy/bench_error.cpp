@@ -443,9 +443,17 @@ Plot plot_of(const std::string& scene, const std::vector<Row>& rows) {
   return plot;
 }
 
+/// Settings that a scene refuses, for one reason.
+struct LeftOut {
+  std::string scene;
+  std::string why;
+  std::size_t settings = 0;
+};
+
 /// Results of the suite so far.
 struct Findings {
   std::vector<Row> rows;
+  std::vector<LeftOut> left_out;
   std::map<std::string, std::string> reference_text;  ///< by scene
   std::string device;
   TextTable references{{"scene", "reference", "pixels", "solve s", "edge band m"}};
@@ -506,6 +514,19 @@ std::string leave_out_clutter(const std::string& name, std::vector<scene::Materi
   return ", without [[clutter]] in all models";
 }
 
+/// Notes that a scene refuses a setting, and warns once of each reason.
+void leave_out(const std::string& scene, const std::string& why, Findings& findings) {
+  const auto known = std::ranges::find_if(findings.left_out, [&](const LeftOut& other) {
+    return other.scene == scene && other.why == why;
+  });
+  if (known != findings.left_out.end()) {
+    ++known->settings;
+    return;
+  }
+  findings.left_out.push_back({scene, why, 1});
+  warn(fmt::format("{}: settings with it are left out: {}", scene, why));
+}
+
 /// Computes the reference of one scene and compares all settings with it.
 Result<void> run_scene(const std::string& name, const ErrorOptions& command, Findings& findings) {
   auto scenario = suite_scenario(name, command);
@@ -526,10 +547,18 @@ Result<void> run_scene(const std::string& name, const ErrorOptions& command, Fin
 
   Progress progress("settings of " + name, settings.size());
   std::uint64_t done = 0;
+  const std::size_t rows_before = findings.rows.size();
+  std::optional<physics::Error> refused;
   ErrorFigures figures(name, view, truth->image);
   for (const Setting& setting : settings) {
     const auto shot = setting.method == Method::embree ? trace(*scenario, setting, view)
                                                        : shoot(*scenario, setting, view, command);
+    progress.advance_to(++done);
+    if (!shot && shot.error().code == physics::ErrorCode::config) {
+      leave_out(name, shot.error().text, findings);
+      refused = shot.error();
+      continue;
+    }
     if (!shot) return tl::unexpected(shot.error());
     if (!shot->device.empty()) findings.device = shot->device;
     if (setting.standard) {
@@ -538,8 +567,9 @@ Result<void> run_scene(const std::string& name, const ErrorOptions& command, Fin
                   shot->temperature_k);
     }
     add_rows(name, setting, *shot, *truth, findings.rows);
-    progress.advance_to(++done);
   }
+  // A scene that refuses every setting is wrong itself.
+  if (refused && findings.rows.size() == rows_before) return tl::unexpected(std::move(*refused));
   return command.figures ? figures.write(*command.figures, scenario->display) : Result<void>();
 }
 
@@ -585,8 +615,14 @@ Result<void> write_files(const std::vector<std::string>& scenes, const ErrorOpti
     results.push(row_json(row, command, findings.reference_text.at(row.scene)));
   }
   Json json = Json::object();
+  Json left_out = Json::array();
+  for (const LeftOut& each : findings.left_out) {
+    Json entry = Json::object();
+    entry.set("scene", each.scene).set("settings", each.settings).set("why", each.why);
+    left_out.push(std::move(entry));
+  }
   json.set("device", findings.device).set("commit", kCommit).set("suite", "error-vs-time");
-  json.set("results", std::move(results));
+  json.set("results", std::move(results)).set("left_out", std::move(left_out));
   return write_json(*command.json, json);
 }
 
@@ -606,6 +642,10 @@ int run(const ErrorOptions& command) {
              "that the reference lacks\n{}{}",
              findings.device, kCommit, command.width_px, command.height_px,
              findings.references.to_string(), table_of(findings.rows).to_string());
+  for (const LeftOut& each : findings.left_out) {
+    fmt::print(text_stream(command.json), "{}: {} settings are left out: {}\n", each.scene,
+               each.settings, each.why);
+  }
   if (auto written = write_files(scenes, command, findings); !written) return fail(written.error());
   return kExitOk;
 }
