@@ -102,7 +102,7 @@ struct SceneSolver::Data {
   Result<std::vector<PixelHit>> see(const SolveView& view, SolvedImage& image,
                                     std::vector<glm::dvec3>& sky_rays) const;
   Result<void> choose_dimension(bool& three);
-  void note_interiors_and_parts();
+  void note_simpler_physics(bool three);
   void note_temperatures(std::span<const PixelHit> hits, std::span<const double> kelvin,
                          std::int64_t sim_time_ns);
   Result<void> check_instant(std::int64_t sim_time_ns) const;
@@ -191,7 +191,7 @@ Result<void> SceneSolver::Data::choose_dimension(bool& three) {
                       "solve: thermal.lateral = false contradicts a solution in three dimensions, "
                       "which conducts along surfaces; ask for one dimension");
   }
-  note_interiors_and_parts();
+  note_simpler_physics(three);
   if (three) return {};
   // Name the keys that one dimension cannot follow.
   const bool moving = std::ranges::any_of(
@@ -207,9 +207,9 @@ Result<void> SceneSolver::Data::choose_dimension(bool& three) {
   return {};
 }
 
-/// Names what no solution follows: the interiors of bodies, parts that heat themselves, and the air
-/// past moving or shaped objects.
-void SceneSolver::Data::note_interiors_and_parts() {
+/// Names what the solution does not follow: gloss, parts that heat themselves, the air past moving
+/// or shaped objects, and in three dimensions the interiors of bodies.
+void SceneSolver::Data::note_simpler_physics(bool three) {
   for (const scene::Material& material : geometry.materials) {
     if (!material.gloss) continue;
     notes.push_back(fmt::format(
@@ -218,7 +218,7 @@ void SceneSolver::Data::note_interiors_and_parts() {
         material.name));
   }
   for (const scene::Material& material : geometry.materials) {
-    if (!material.rests_on_body()) continue;
+    if (!three || !material.rests_on_body()) continue;
     notes.push_back(
         fmt::format("material '{}' rests on the interior of its body, which is held at {:.1f} K "
                     "here",
@@ -374,7 +374,7 @@ Result<std::vector<PixelHit>> SceneSolver::Data::see(const SolveView& view, Solv
       // Take the face's own normal if the interpolated one turns away from the side that is seen.
       if (glm::dot(normal, hit->geometric_normal) <= 0.0) normal = hit->geometric_normal;
       if (!hit->front) normal = -normal;
-      p.point = {hit->position_world_m, normal, hit->material, hit->entity};
+      p.point = {hit->position_world_m, normal, hit->material, hit->entity, hit->instance};
       found[pixel] = p;
       image.depth_m[pixel] = static_cast<float>(hit->distance_m / glm::length(sensor_ray));
       image.object_id[pixel] = static_cast<float>(hit->object + 1);
@@ -534,6 +534,12 @@ Result<std::vector<double>> SceneSolver::Data::temperatures(std::vector<PixelHit
   });
   if (!solved) return tl::unexpected(std::move(solved.error()));
   points = std::move(*solved);
+  constexpr double kToldK = 0.01;
+  if (points.interior_left_k > kToldK) {
+    notes.push_back(
+        fmt::format("the interiors of bodies still changed by {:.2f} K in the last round",
+                    points.interior_left_k));
+  }
   return points.kelvin;
 }
 
@@ -603,7 +609,7 @@ std::optional<PixelHit> SceneSolver::Data::surface_at(const SceneInstant& instan
   out.normal = normal;
   out.object = hit->object;
   PixelHit p;
-  p.point = {hit->position_world_m, normal, hit->material, hit->entity};
+  p.point = {hit->position_world_m, normal, hit->material, hit->entity, hit->instance};
   return p;
 }
 

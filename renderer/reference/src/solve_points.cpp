@@ -15,6 +15,7 @@
 
 #include "emit/reference/surface_water.hpp"
 #include "emit/threads/parallel.hpp"
+#include "solve_bodies.hpp"
 #include "solve_sight.hpp"
 
 namespace emit::reference {
@@ -39,6 +40,24 @@ constexpr std::uint32_t kRaysPerSightRay = 4;
 constexpr std::uint32_t kLeastSightRays = 16;
 /// Distance beyond which an entity does not change a point's view of the sky.
 constexpr double kEntityReachM = 25.0;
+
+/// Runs `body` for every index below `count` in portions, in parallel, and reports after each with
+/// the share done, which goes from `from` to `to`. Returns false if `done` stopped it.
+template <class Body>
+bool in_portions(std::size_t count, double from, double to, const std::function<bool(double)>& done,
+                 Body body) {
+  const std::size_t portion = std::max<std::size_t>(64, count / 100);
+  for (std::size_t begin = 0; begin < count; begin += portion) {
+    const std::size_t end = std::min(count, begin + portion);
+    threads::parallel_ranges(tbb::blocked_range<std::size_t>(begin, end, 4),
+                             [&](const auto& range) {
+                               for (std::size_t i = range.begin(); i != range.end(); ++i) body(i);
+                             });
+    const double share = static_cast<double>(end) / static_cast<double>(count);
+    if (done && !done(from + (to - from) * share)) return false;
+  }
+  return true;
+}
 
 /// The views of one point over its history: at the nodes, and between them where the sun's share
 /// changes. The share of the sky is remembered from one look to the next, so that the order of the
@@ -239,7 +258,12 @@ class PointHistories::Run {
     all.choose_nodes(sim_time_ns, nodes_ns_);
     instants_.reserve(nodes_ns_.size());
     for (const std::int64_t t : nodes_ns_) instants_.push_back(all.scene_.at(t));
+    bodies_.emplace(all.scenario_, all.geometry_, all.scene_, all.climate_, nodes_ns_,
+                    instants_.back());
   }
+  Run(const Run&) = delete;
+  Run& operator=(const Run&) = delete;
+  ~Run() = default;
 
   [[nodiscard]] std::span<const std::int64_t> nodes_ns() const noexcept { return nodes_ns_; }
 
@@ -254,6 +278,8 @@ class PointHistories::Run {
     }
     return {};
   }
+
+  [[nodiscard]] BodyInteriors& bodies() noexcept { return *bodies_; }
 
   /// Returns the rays of the scenery in the view of a point at the instant of the solution.
   [[nodiscard]] std::vector<HemisphereRay> rays_of(const SolvePoint& point) const {
@@ -274,6 +300,7 @@ class PointHistories::Run {
       std::ranges::fill(out_k, *material.prescribed_k);
       return front;
     }
+    const std::span<const BaseSample> base = bodies_->course(point);
     std::vector<ViewSample> back;
     if (material.sheet) {
       SolvePoint behind = point;
@@ -281,6 +308,17 @@ class PointHistories::Run {
       back = views(behind);
       if (patches != nullptr) patches->add_to(back, back_sees);
     }
+    carry(point, front, back, base, times_ns, out_k, {});
+    return front;
+  }
+
+  /// Computes the temperatures of a point from its views and the course of its base, and the heat
+  /// that leaves through the base if `out_base_j_m2` is not empty.
+  void carry(const SolvePoint& point, std::span<const ViewSample> front,
+             std::span<const ViewSample> back, std::span<const BaseSample> base,
+             std::span<const std::int64_t> times_ns, std::span<double> out_k,
+             std::span<double> out_base_j_m2) {
+    const scene::Material& material = all_.geometry_.materials[point.material];
     // Keep one solver per thread and material.
     auto& mine = solvers_.local();
     const auto solver = mine.try_emplace(point.material, all_.climate_, meshes_.at(point.material),
@@ -293,9 +331,33 @@ class PointHistories::Run {
       return rain_on_face_frac(instants_.back(), {point.position_world_m, normal, 1e-9});
     };
     solver->second.run(point.normal,
-                       {front, back, rain_frac(point.normal), rain_frac(-point.normal)}, times_ns,
-                       out_k);
-    return front;
+                       {front, back, rain_frac(point.normal), rain_frac(-point.normal), base},
+                       times_ns, out_k, out_base_j_m2);
+  }
+
+  /// Brings the interiors of the first `bodies` bodies into balance. `patches` and `sights` are
+  /// what their points see of the scenery; no patches leave it out.
+  bool balance(std::size_t bodies, const PatchHistories* patches,
+               std::span<const PointSight> sights, const std::function<bool(double)>& done) {
+    const std::span<const SolvePoint> points = bodies_->points();
+    // The views are the same in all rounds.
+    const std::size_t had = body_views_.size();
+    body_views_.resize(points.size());
+    if (!in_portions(points.size() - had, 0.0, 0.5, done,
+                     [&](std::size_t p) { body_views_[had + p] = views(points[had + p]); })) {
+      return false;
+    }
+    std::vector<std::vector<ViewSample>> lit(body_views_);
+    for (std::size_t p = 0; patches != nullptr && p < sights.size(); ++p) {
+      patches->add_to(lit[p], sights[p]);
+    }
+    return bodies_->balance(
+        bodies,
+        [&](std::size_t p, std::span<const BaseSample> base, std::span<double> out_base_j_m2) {
+          std::vector<double> kelvin(nodes_ns_.size());
+          carry(points[p], lit[p], {}, base, nodes_ns_, kelvin, out_base_j_m2);
+        },
+        [&](double share) { return !done || done(0.5 + 0.5 * share); });
   }
 
   /// Computes the radiation of a patch at all nodes, and its last state.
@@ -326,29 +388,13 @@ class PointHistories::Run {
   std::int64_t sim_time_ns_;
   std::vector<std::int64_t> nodes_ns_;
   std::vector<SceneInstant> instants_;
+  std::optional<BodyInteriors> bodies_;
+  std::vector<std::vector<ViewSample>> body_views_;  ///< of the points of the bodies
   std::map<std::uint32_t, LayerMesh> meshes_;
   tbb::enumerable_thread_specific<std::map<std::uint32_t, PointSolver>> solvers_;
 };
 
 namespace {
-
-/// Runs `body` for every index below `count` in portions, in parallel, and reports after each with
-/// the share done, which goes from `from` to `to`. Returns false if `done` stopped it.
-template <class Body>
-bool in_portions(std::size_t count, double from, double to, const std::function<bool(double)>& done,
-                 Body body) {
-  const std::size_t portion = std::max<std::size_t>(64, count / 100);
-  for (std::size_t begin = 0; begin < count; begin += portion) {
-    const std::size_t end = std::min(count, begin + portion);
-    threads::parallel_ranges(tbb::blocked_range<std::size_t>(begin, end, 4),
-                             [&](const auto& range) {
-                               for (std::size_t i = range.begin(); i != range.end(); ++i) body(i);
-                             });
-    const double share = static_cast<double>(end) / static_cast<double>(count);
-    if (done && !done(from + (to - from) * share)) return false;
-  }
-  return true;
-}
 
 /// Returns a point as its back sees it.
 SolvePoint back_of(SolvePoint point) {
@@ -392,6 +438,14 @@ Result<PointSolution> PointHistories::temperatures(std::span<const SolvePoint> p
   SightBuilder sight;
   const bool exchange = scenario_.thermal.exchange;
   if (exchange) trace_sights(run, points, sight, solution.sights, back_sights);
+  // The bodies of the points see patches too. Those of patches do not.
+  run.bodies().add(points);
+  const std::size_t own_bodies = run.bodies().size();
+  std::vector<PointSight> body_sights(run.bodies().points().size());
+  if (exchange) {
+    std::vector<PointSight> no_backs(body_sights.size());
+    trace_sights(run, run.bodies().points(), sight, body_sights, no_backs);
+  }
   // The patches see further patches, which take their surroundings for all that they see.
   const std::size_t seen = sight.patches().size();
   const std::vector<SolvePoint> near_places = sight.patches();
@@ -400,26 +454,47 @@ Result<PointSolution> PointHistories::temperatures(std::span<const SolvePoint> p
   if (exchange) trace_sights(run, near_places, sight, patch_sights, patch_back_sights);
   const std::vector<SolvePoint>& places = sight.patches();
   if (auto built = run.add_meshes(places); !built) return tl::unexpected(std::move(built.error()));
+  run.bodies().add(places);
+  solution.bodies = run.bodies().size();
+  const std::span<const SolvePoint> body_points = run.bodies().points();
+  if (auto built = run.add_meshes(body_points); !built) {
+    return tl::unexpected(std::move(built.error()));
+  }
   PatchHistories far_patches(run.nodes_ns(), places.size());
   PatchHistories patches(run.nodes_ns(), seen);
-  // Solve the patches without others, those that the points see with them, then the points.
-  const auto work = static_cast<double>(places.size() + seen + points.size());
-  const double first = static_cast<double>(places.size()) / std::max(1.0, work);
-  const double second = static_cast<double>(places.size() + seen) / std::max(1.0, work);
-  const bool all_patches = in_portions(places.size(), 0.0, first, done,
-                                       [&](std::size_t i) {
-                                         run.solve_patch(places[i], nullptr, {}, {},
-                                                         far_patches.of(i), far_patches.last(i));
-                                       }) &&
-                           in_portions(seen, first, second, done, [&](std::size_t i) {
-                             run.solve_patch(places[i], &far_patches, patch_sights[i],
-                                             patch_back_sights[i], patches.of(i), patches.last(i));
-                           });
+  // Solve the interiors and the patches without others, the patches that the points see with them,
+  // the interiors of the points with those, then the points.
+  const double each =
+      1.0 /
+      std::max(1.0, static_cast<double>(body_points.size() + places.size() + seen + points.size()));
+  const double bodies = 0.8 * each * static_cast<double>(body_points.size());
+  const double first = bodies + each * static_cast<double>(places.size());
+  const double second = first + each * static_cast<double>(seen);
+  const double third = second + 0.25 * bodies;
+  const auto part_of = [&](double from, double to) {
+    return [&done, from, to](double share) { return !done || done(from + (to - from) * share); };
+  };
+  const bool lit_bodies =
+      std::ranges::any_of(body_sights, [](const PointSight& sees) { return !sees.links.empty(); });
+  const bool all_patches =
+      run.balance(run.bodies().size(), nullptr, {}, part_of(0.0, bodies)) &&
+      in_portions(places.size(), bodies, first, done,
+                  [&](std::size_t i) {
+                    run.solve_patch(places[i], nullptr, {}, {}, far_patches.of(i),
+                                    far_patches.last(i));
+                  }) &&
+      in_portions(seen, first, second, done,
+                  [&](std::size_t i) {
+                    run.solve_patch(places[i], &far_patches, patch_sights[i], patch_back_sights[i],
+                                    patches.of(i), patches.last(i));
+                  }) &&
+      (!lit_bodies || run.balance(own_bodies, &patches, body_sights, part_of(second, third)));
+  solution.interior_left_k = run.bodies().left_k();
   if (!all_patches) {
     solution.sights.assign(points.size(), {});
     return solution;
   }
-  in_portions(points.size(), second, 1.0, done, [&](std::size_t i) {
+  in_portions(points.size(), third, 1.0, done, [&](std::size_t i) {
     run.solve(points[i], &patches, solution.sights[i], back_sights[i], std::span(&sim_time_ns, 1),
               std::span(&solution.kelvin[i], 1));
   });

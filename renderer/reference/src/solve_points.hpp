@@ -18,6 +18,7 @@ struct SolvePoint {
   glm::dvec3 normal{0.0};  ///< unit normal towards the visible side
   std::uint32_t material = 0;
   std::uint32_t entity = kNoEntity;
+  std::uint32_t instance = 0;  ///< index into SceneGeometry::instances
 };
 
 /// Share of a point's hemisphere that shows a patch of the scenery.
@@ -44,13 +45,17 @@ struct PointSolution {
   std::vector<PointSight> sights;  ///< one per point; without links if there is no exchange
   std::vector<std::uint32_t> patch_material;
   std::vector<PatchState> patches;
+  std::size_t bodies = 0;        ///< number of interiors that were solved
+  double interior_left_k = 0.0;  ///< largest change of an interior in the last round
 };
 
 /// One-dimensional histories of points, with the visibility of sun and sky at the places where the
 /// points were in the past, and with the radiation of the scenery that they see: with
 /// thermal.exchange, rays end on patches with histories of their own, and theirs on further
 /// patches, which take all that they see for surroundings of the environment's temperature. Moving
-/// objects and what they see count as surroundings. Owner: the caller.
+/// objects and what they see count as surroundings. Faces that rest on the interior of their body
+/// follow its temperature (BodyInteriors), which patches take from faces without exchange. Owner:
+/// the caller.
 class PointHistories {
  public:
   /// Prepares histories from the start of the climate's history. Visibility is sampled densely from

@@ -32,7 +32,8 @@ std::uint32_t SightBuilder::patch_of(const RayHit& hit) {
   }
   key[7] = hit.material;
   const auto [found, added] = index_.try_emplace(key, static_cast<std::uint32_t>(patches_.size()));
-  if (added) patches_.push_back({hit.position_world_m, normal, hit.material, kNoEntity});
+  if (added)
+    patches_.push_back({hit.position_world_m, normal, hit.material, kNoEntity, hit.instance});
   return found->second;
 }
 

@@ -158,6 +158,8 @@ void LayerSolver::reset(double time_s) {
   time_s_ = time_s;
   next_step_s_ = std::numeric_limits<double>::infinity();
   heat_in_j_m2_ = 0.0;
+  heat_out_of_base_j_m2_ = 0.0;
+  base_rate_k_s_ = 0.0;
   held_ = false;
   counts_ = {};
   // Hold the base and take the flux of the profile as the flux before the start.
@@ -251,22 +253,22 @@ void LayerSolver::conduct() noexcept {
   }
 }
 
-void LayerSolver::multiply_mass(const std::vector<double>& in,
+void LayerSolver::multiply_mass(const std::vector<double>& in, double base,
                                 std::vector<double>& out) const noexcept {
-  // Skip the node below the last unknown: it is held, so its change is zero.
+  // The node below the last unknown is a held base, and changes by `base`.
   const auto above = mesh_->mass_above();
   const auto own = mesh_->mass_own();
   const auto below = mesh_->mass_below();
   const std::size_t last = unknowns_ - 1;
   if (last == 0) {
-    out[0] = own[0] * in[0];
+    out[0] = own[0] * in[0] + below[0] * base;
     return;
   }
   out[0] = own[0] * in[0] + below[0] * in[1];
   for (std::size_t i = 1; i < last; ++i) {
     out[i] = above[i] * in[i - 1] + own[i] * in[i] + below[i] * in[i + 1];
   }
-  out[last] = above[last] * in[last - 1] + own[last] * in[last];
+  out[last] = above[last] * in[last - 1] + own[last] * in[last] + below[last] * base;
 }
 
 template <class Face>
@@ -307,7 +309,14 @@ LayerSolver::StepOutcome LayerSolver::try_step(double start_frac, double step_fr
 
   // Solve the first stage, the trapezium to t + gamma dt. The unknowns are increments on the start
   // of the step: (M + b K) x = right-hand side.
+  // A base that moves adds a known term to the last of them.
+  const double base_step_k = base_rate_k_s_ * step_s;
+  const double base_stage_k = kGamma * base_step_k;
+  const double base_pull = mesh_->base_held()
+                               ? b * mesh_->conductance_w_m2_k()[n - 1] - mesh_->mass_below()[n - 1]
+                               : 0.0;
   for (std::size_t i = 0; i < n; ++i) stage_[i] = 2.0 * b * conducted_[i];
+  stage_[n - 1] += base_pull * base_stage_k;
   stage_[0] += b * flux_start.flux_w_m2;
   eliminate(factors, stage_);
   const double stage_frac = start_frac + kGamma * step_frac;
@@ -317,10 +326,11 @@ LayerSolver::StepOutcome LayerSolver::try_step(double start_frac, double step_fr
     stage_[0] = solve_face(face, stage_frac, pivot, stage_[0], b, 0.0, flux_stage);
   }
   substitute(factors, stage_);
-  multiply_mass(stage_, stage_mass_);
+  multiply_mass(stage_, base_stage_k, stage_mass_);
 
   // Solve the second stage, BDF2 to the end of the step.
   for (std::size_t i = 0; i < n; ++i) final_[i] = kW / kD * stage_mass_[i] + b * conducted_[i];
+  final_[n - 1] += base_pull * base_step_k;
   eliminate(factors, final_);
   if constexpr (Face::kHeld) {
     final_[0] = face.temperature_k(start_frac + step_frac) - offset_k_ - theta_[0];
@@ -334,7 +344,7 @@ LayerSolver::StepOutcome LayerSolver::try_step(double start_frac, double step_fr
   // Estimate the error by the embedded third-order method; the implicit matrix damps it like the
   // step.
   if (estimate) {
-    multiply_mass(final_, final_mass_);
+    multiply_mass(final_, base_step_k, final_mass_);
     for (std::size_t i = 0; i < n; ++i) {
       error_[i] = 4.0 / 3.0 * kW * step_s * conducted_[i] -
                   (1.0 + 2.0 * kW) / (3.0 * kD) * stage_mass_[i] + 2.0 / 3.0 * final_mass_[i];
@@ -352,27 +362,34 @@ LayerSolver::StepOutcome LayerSolver::try_step(double start_frac, double step_fr
 
   // Sum the heat of the step with the weights of the method.
   const std::size_t last = mesh_->nodes() - 1;
+  outcome.base_change_k = base_step_k;
+  if (mesh_->base_held()) {
+    const double own_j_m2 =
+        mesh_->mass_above()[last] * final_[n - 1] + mesh_->mass_own()[last] * base_step_k;
+    const double now_k = theta_[n - 1] - theta_[last];
+    outcome.base_heat_j_m2 =
+        step_s * mesh_->conductance_w_m2_k()[n - 1] *
+            (now_k + kW * (stage_[n - 1] - base_stage_k) + kD * (final_[n - 1] - base_step_k)) -
+        own_j_m2;
+    if constexpr (Face::kHeld) outcome.heat_j_m2 += own_j_m2;
+  }
   // A held face takes the flux that the stored heat requires.
   if constexpr (Face::kHeld) {
-    multiply_mass(final_, final_mass_);
+    multiply_mass(final_, base_step_k, final_mass_);
     for (const double heat : final_mass_) outcome.heat_j_m2 += heat;
-    if (mesh_->base_held()) outcome.heat_j_m2 += mesh_->mass_above()[last] * final_[n - 1];
   } else {
     outcome.heat_j_m2 =
-        step_s * (kW * (flux_start.flux_w_m2 + flux_stage.flux_w_m2) + kD * flux_end.flux_w_m2);
-    if (mesh_->base_held()) {
-      const double now = theta_[n - 1] - theta_[last];
-      outcome.heat_j_m2 -= step_s * mesh_->conductance_w_m2_k()[n - 1] *
-                               (now + kW * stage_[n - 1] + kD * final_[n - 1]) -
-                           mesh_->mass_above()[last] * final_[n - 1];
-    }
+        step_s * (kW * (flux_start.flux_w_m2 + flux_stage.flux_w_m2) + kD * flux_end.flux_w_m2) -
+        outcome.base_heat_j_m2;
   }
   return outcome;
 }
 
 void LayerSolver::accept(const StepOutcome& outcome) noexcept {
   for (std::size_t i = 0; i < unknowns_; ++i) theta_[i] += final_[i];
+  if (mesh_->base_held()) theta_.back() += outcome.base_change_k;
   heat_in_j_m2_ += outcome.heat_j_m2;
+  heat_out_of_base_j_m2_ += outcome.base_heat_j_m2;
   last_flux_w_m2_ = outcome.face_flux_w_m2;
   ++counts_.accepted;
   conduct();
@@ -473,6 +490,18 @@ void LayerSolver::advance_held(double end_s, double start_k, double end_k) noexc
   run(end_s, HeldFace{start_k, end_k});
 }
 
+void LayerSolver::move_base(double temperature_k, double rate_k_s) noexcept {
+  EMIT_CHECK(mesh_->base_held());
+  // Apply a jump of the temperature, with the heat that it stores.
+  const double jump_k = temperature_k - offset_k_ - theta_.back();
+  const double stored_j_m2 =
+      (mesh_->mass_own().back() + mesh_->mass_below()[unknowns_ - 1]) * jump_k;
+  theta_.back() += jump_k;
+  heat_in_j_m2_ += stored_j_m2;
+  heat_out_of_base_j_m2_ -= stored_j_m2;
+  base_rate_k_s_ = rate_k_s;
+}
+
 double LayerSolver::temperature_k(double depth_m) const noexcept {
   const auto depths = mesh_->depth_m();
   const auto conductance = mesh_->conductance_w_m2_k();
@@ -492,7 +521,7 @@ double LayerSolver::temperature_k(double depth_m) const noexcept {
   const auto rate_k_s = [&](std::size_t node) {
     const std::size_t last = theta_.size() - 1;
     if (node == 0 && held_) return face_rate_k_s_;
-    if (node == last && mesh_->base_held()) return 0.0;
+    if (node == last && mesh_->base_held()) return base_rate_k_s_;
     double gain =
         node == 0 ? last_flux_w_m2_ : conductance[node - 1] * (theta_[node - 1] - theta_[node]);
     double heat = node == 0 ? 0.0 : 0.5 * capacity[node - 1];

@@ -38,6 +38,11 @@ ViewSample mix(const ViewSample& a, const ViewSample& b, double f) noexcept {
           at(a.scene_longwave_w_m2, b.scene_longwave_w_m2)};
 }
 
+/// Interpolates a temperature of the base.
+BaseSample mix(const BaseSample& a, const BaseSample& b, double f) noexcept {
+  return {a.time_ns, a.kelvin + f * (b.kelvin - a.kelvin)};
+}
+
 /// Moves `row` on to the last row at or before `now_ns`. At a jump this is the later one.
 template <class Rows>
 void seek(const Rows& rows, std::int64_t now_ns, std::size_t& row) noexcept {
@@ -106,6 +111,14 @@ void PointSolver::advance(const SurfaceOptics& surface, const Views& views,
       seek(views.back, now_ns_, back_row_);
       end_ns = std::min(end_ns, next_time(views.back, now_ns_, back_row_));
     }
+    // The interior of a body also has the bends of its course.
+    if (!views.base.empty()) {
+      seek(views.base, now_ns_, base_row_);
+      end_ns = std::min(end_ns, next_time(views.base, now_ns_, base_row_));
+      const double from_k = value_at(views.base, now_ns_, base_row_).kelvin;
+      const double to_k = value_at(views.base, end_ns, base_row_).kelvin;
+      solver_.move_base(from_k, (to_k - from_k) / (1e-9 * static_cast<double>(end_ns - now_ns_)));
+    }
     // Build the state of the face. A sheet takes the mean of both faces, physics.md eq. 24.
     const auto state = [&](std::int64_t time_ns) {
       ClimateNode climate = value_at(nodes, time_ns, climate_row_);
@@ -155,8 +168,11 @@ void PointSolver::spin_up(const SurfaceOptics& surface) {
 }
 
 void PointSolver::run(const glm::dvec3& normal, const Views& views,
-                      std::span<const std::int64_t> times_ns, std::span<double> out_k) {
+                      std::span<const std::int64_t> times_ns, std::span<double> out_k,
+                      std::span<double> out_base_j_m2) {
   EMIT_CHECK_OP(out_k.size(), ==, times_ns.size());
+  EMIT_CHECK(out_base_j_m2.empty() || out_base_j_m2.size() == times_ns.size());
+  EMIT_CHECK(views.base.empty() || !material_->sheet);
   if (material_->prescribed_k) {
     std::fill(out_k.begin(), out_k.end(), *material_->prescribed_k);
     return;
@@ -176,16 +192,21 @@ void PointSolver::run(const glm::dvec3& normal, const Views& views,
   climate_row_ = 0;
   view_row_ = 0;
   back_row_ = 0;
+  base_row_ = 0;
   // Replace empty views by open ones.
   const ViewSample open = open_view(normal);
   const ViewSample open_behind = open_view(-normal);
   const Views seen{views.front.empty() ? std::span(&open, 1) : views.front,
                    views.back.empty() ? std::span(&open_behind, 1) : views.back,
-                   views.front_rain_frac, views.back_rain_frac};
+                   views.front_rain_frac, views.back_rain_frac, views.base};
   // Advance from answer to answer.
+  double first_j_m2 = 0.0;
   for (std::size_t i = 0; i < times_ns.size(); ++i) {
     advance(surface, seen, times_ns[i]);
     out_k[i] = solver_.face_k();
+    if (out_base_j_m2.empty()) continue;
+    if (i == 0) first_j_m2 = solver_.heat_out_of_base_j_m2();
+    out_base_j_m2[i] = solver_.heat_out_of_base_j_m2() - first_j_m2;
   }
 }
 

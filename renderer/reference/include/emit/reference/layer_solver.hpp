@@ -147,6 +147,10 @@ class LayerSolver {
   /// Steps to `end_s` with the face held at a temperature that is linear in time. A jump of the
   /// temperature at the start of the stretch is allowed.
   void advance_held(double end_s, double start_k, double end_k) noexcept;
+  /// Sets the temperature at which the base is held now, and the rate at which it changes from now
+  /// on, until this is called again. start() and start_nodes() hold it still at the mesh's.
+  /// @pre mesh().base_held()
+  void move_base(double temperature_k, double rate_k_s) noexcept;
 
   [[nodiscard]] double time_s() const noexcept { return time_s_; }
   [[nodiscard]] double face_k() const noexcept { return offset_k_ + theta_[0]; }
@@ -162,6 +166,8 @@ class LayerSolver {
   /// the weights of the method. It equals the change of stored_heat_j_m2() to rounding. A held face
   /// takes the flux that the balance leaves for it.
   [[nodiscard]] double heat_in_j_m2() const noexcept { return heat_in_j_m2_; }
+  /// Integral since start() of the flux out of a held base, J/m2, with the same weights.
+  [[nodiscard]] double heat_out_of_base_j_m2() const noexcept { return heat_out_of_base_j_m2_; }
   [[nodiscard]] const StepCounts& counts() const noexcept { return counts_; }
   [[nodiscard]] const LayerMesh& mesh() const noexcept { return *mesh_; }
 
@@ -178,6 +184,8 @@ class LayerSolver {
   struct StepOutcome {
     double error_k = 0.0;
     double heat_j_m2 = 0.0;
+    double base_heat_j_m2 = 0.0;
+    double base_change_k = 0.0;
     double face_flux_w_m2 = 0.0;
   };
 
@@ -193,7 +201,8 @@ class LayerSolver {
                                   double gain, double guess_k, FaceFlux& flux) noexcept;
   void conduct() noexcept;
   void accept(const StepOutcome& outcome) noexcept;
-  void multiply_mass(const std::vector<double>& in, std::vector<double>& out) const noexcept;
+  void multiply_mass(const std::vector<double>& in, double base,
+                     std::vector<double>& out) const noexcept;
 
   const LayerMesh* mesh_;
   StepOptions options_;
@@ -204,6 +213,8 @@ class LayerSolver {
   /// Flux into the face at the end of the last stretch.
   double last_flux_w_m2_ = 0.0;
   double heat_in_j_m2_ = 0.0;
+  double heat_out_of_base_j_m2_ = 0.0;
+  double base_rate_k_s_ = 0.0;
   /// Rate of the present stretch if the face is held.
   double face_rate_k_s_ = 0.0;
   bool held_ = false;

@@ -98,6 +98,13 @@ struct ViewSample {
   double scene_longwave_w_m2 = 0.0;
 };
 
+/// Temperature under the last layer at an instant. It is linear between samples and constant
+/// outside them.
+struct BaseSample {
+  std::int64_t time_ns = 0;
+  double kelvin = 0.0;
+};
+
 /// Orientation and optics of a surface point. `normal` is a unit vector in world axes, z up.
 struct SurfaceOptics {
   glm::dvec3 normal{0.0, 0.0, 1.0};
@@ -147,12 +154,17 @@ class PointSolver {
     // Share of the rain on open, level ground that each face gets; absent: nothing is above it.
     std::optional<double> front_rain_frac = std::nullopt;
     std::optional<double> back_rain_frac = std::nullopt;
+    /// Temperature of the base, ascending; empty: that of the material throughout.
+    std::span<const BaseSample> base = {};
   };
   /// Computes the temperatures at `times_ns`, which ascend. A time before the start of the history
   /// gives the temperature of its start. A prescribed material gives its prescribed temperature.
-  /// @pre out_k has the size of times_ns.
+  /// `out_base_j_m2` takes the heat that has left through the base by then, J/m2 since the first of
+  /// these times.
+  /// @pre out_k has the size of times_ns, and so has out_base_j_m2 if it is not empty; a material
+  /// with a course of its base is no sheet.
   void run(const glm::dvec3& normal, const Views& views, std::span<const std::int64_t> times_ns,
-           std::span<double> out_k);
+           std::span<double> out_k, std::span<double> out_base_j_m2 = {});
 
   /// Solver after run(), with profile and counters.
   [[nodiscard]] const LayerSolver& solver() const noexcept { return solver_; }
@@ -170,6 +182,7 @@ class PointSolver {
   std::size_t climate_row_ = 0;
   std::size_t view_row_ = 0;
   std::size_t back_row_ = 0;
+  std::size_t base_row_ = 0;
   bool has_spin_up_ = false;
   glm::dvec3 spin_up_normal_{0.0};
   std::vector<double> spin_up_k_;  ///< temperature of every node at the start of the history
