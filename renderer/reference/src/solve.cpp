@@ -198,8 +198,8 @@ Result<void> SceneSolver::Data::choose_dimension(bool& three) {
       geometry.instances, [](const scene::Instance& instance) { return instance.entity_id != 0; });
   if (scenario.thermal.exchange && moving) {
     notes.emplace_back(
-        "in one dimension thermal.exchange leaves moving objects out: they and what they see count "
-        "as surroundings of environment temperature");
+        "in one dimension thermal.exchange leaves out objects while they move: what they see and "
+        "what they send count as surroundings of environment temperature");
   }
   if (!scenario.contacts.empty()) {
     notes.emplace_back("in one dimension [[contact]] has no effect: no body conducts to another");
@@ -466,7 +466,7 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
           incoming += static_cast<double>(link.share_frac) * patch[link.patch];
         }
       } else {
-        for (const SightLink& link : points.sights[i].links) {
+        for (const SightLink& link : points.sights[i].now()) {
           incoming += link.share_frac * patch[link.patch];
         }
       }
@@ -568,7 +568,7 @@ Result<SolvedImage> SceneSolver::image(const SolveView& view) {
                                        d.options.rays)
                              .sky_cosine.value_frac;
       double known_frac = hits[i].sky_frac;
-      for (const SightLink& link : d.points.sights[i].links) known_frac += link.share_frac;
+      for (const SightLink& link : d.points.sights[i].now()) known_frac += link.share_frac;
       hits[i].ground_frac = std::max(0.0, 1.0 - known_frac);
     });
   }

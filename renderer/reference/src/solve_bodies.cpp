@@ -14,8 +14,6 @@
 namespace emit::reference {
 namespace {
 
-/// Points that stand for the faces of a body.
-constexpr std::size_t kPointsPerBody = 128;
 /// Rounds end when no interior changes by more than this at any instant.
 constexpr double kSettledK = 0.005;
 constexpr int kMostRounds = 40;
@@ -67,20 +65,20 @@ BodyInteriors::Key BodyInteriors::key_of(const SolvePoint& point) const {
   return {instance.object, instance.placement};
 }
 
-void BodyInteriors::add(std::span<const SolvePoint> points) {
+void BodyInteriors::add(std::span<const SolvePoint> points, std::size_t points_per_body) {
   for (const SolvePoint& point : points) {
     const scene::Material& material = geometry_.materials[point.material];
     if (!material.rests_on_body()) continue;
     const auto [found, added] = index_.try_emplace(key_of(point), bodies_.size());
     if (!added) continue;
     Body& body = bodies_.emplace_back();
-    spread_points(found->first, body);
+    spread_points(found->first, points_per_body, body);
     for (const std::int64_t t : nodes_ns_) body.course.push_back({t, material.base_k});
   }
 }
 
 /// Spreads points over the faces of a body, each of which stands for the same area.
-void BodyInteriors::spread_points(const Key& key, Body& body) {
+void BodyInteriors::spread_points(const Key& key, std::size_t count, Body& body) {
   // Collect the triangles that rest on the interior.
   std::vector<Face> faces;
   for (std::uint32_t i = 0; i < geometry_.instances.size(); ++i) {
@@ -105,7 +103,7 @@ void BodyInteriors::spread_points(const Key& key, Body& body) {
   // Take equal steps along the sum of the areas. Places within the triangles follow a sequence that
   // fills the square evenly (Roberts, 2018: powers of the plastic number).
   body.first = points_.size();
-  body.count = kPointsPerBody;
+  body.count = count;
   for (std::size_t k = 0; k < body.count; ++k) {
     const double step = (static_cast<double>(k) + 0.5) / static_cast<double>(body.count);
     const auto at = std::ranges::upper_bound(up_to_m2, step * up_to_m2.back()) - up_to_m2.begin();

@@ -31,8 +31,9 @@ class BodyInteriors {
                 const RayScene& scene, const SurfaceClimate& climate,
                 std::span<const std::int64_t> nodes_ns, const SceneInstant& now);
 
-  /// Adds the bodies on whose interiors these points rest. Setup: it allocates.
-  void add(std::span<const SolvePoint> points);
+  /// Adds the bodies on whose interiors these points rest, each with a number of points that stand
+  /// for its faces. Setup: it allocates.
+  void add(std::span<const SolvePoint> points, std::size_t points_per_body);
   [[nodiscard]] std::size_t size() const noexcept { return bodies_.size(); }
   /// Returns the points that stand for the faces, in the order in which their bodies were added.
   [[nodiscard]] std::span<const SolvePoint> points() const noexcept { return points_; }
@@ -63,7 +64,7 @@ class BodyInteriors {
   using Key = std::pair<std::uint32_t, std::uint32_t>;  ///< object and placement
 
   [[nodiscard]] Key key_of(const SolvePoint& point) const;
-  void spread_points(const Key& key, Body& body);
+  void spread_points(const Key& key, std::size_t count, Body& body);
   [[nodiscard]] double follow(Body& body, std::span<const double> heat_j_m2) const;
 
   const scene::ScenarioDesc& scenario_;

@@ -26,9 +26,19 @@ struct SightLink {
   std::uint32_t patch = 0;
   double share_frac = 0.0;
 };
-/// Patches in the view of a point.
-struct PointSight {
+/// Patches in the view of a point from an instant on.
+struct SightEpoch {
+  std::int64_t from_ns = 0;
   std::vector<SightLink> links;
+};
+/// Patches in the view of a point over its history. An epoch lasts until the next one begins.
+struct PointSight {
+  std::vector<SightEpoch> epochs;  ///< ascending; empty: no patches
+
+  /// Returns the links of the last epoch, in which the picture lies.
+  [[nodiscard]] std::span<const SightLink> now() const noexcept {
+    return epochs.empty() ? std::span<const SightLink>() : epochs.back().links;
+  }
 };
 
 /// State of a patch at an instant.
@@ -50,10 +60,10 @@ struct PointSolution {
 };
 
 /// One-dimensional histories of points, with the visibility of sun and sky at the places where the
-/// points were in the past, and with the radiation of the scenery that they see: with
-/// thermal.exchange, rays end on patches with histories of their own, and theirs on further
-/// patches, which take all that they see for surroundings of the environment's temperature. Moving
-/// objects and what they see count as surroundings. Faces that rest on the interior of their body
+/// points were in the past, and with the radiation of what they see: with thermal.exchange, rays
+/// end on patches with histories of their own, and theirs on further patches, which take all that
+/// they see for surroundings of the environment's temperature. While an object moves, what it sees
+/// and what it sends to others count as surroundings. Faces that rest on the interior of their body
 /// follow its temperature (BodyInteriors), which patches take from faces without exchange. Owner:
 /// the caller.
 class PointHistories {
@@ -74,10 +84,9 @@ class PointHistories {
 
  private:
   class Run;
-  void trace_sights(const Run& run, std::span<const SolvePoint> points, SightBuilder& sight,
-                    std::span<PointSight> front, std::span<PointSight> back) const;
-  void choose_nodes(std::int64_t until_ns, std::vector<std::int64_t>& nodes_ns) const;
-  [[nodiscard]] bool moves(const SceneInstant& a, const SceneInstant& b) const;
+  void trace_sights(const Run& run, std::span<const SolvePoint> points, double patch_factor,
+                    SightBuilder& sight, std::span<PointSight> front,
+                    std::span<PointSight> back) const;
 
   const scene::ScenarioDesc& scenario_;
   const scene::SceneGeometry& geometry_;

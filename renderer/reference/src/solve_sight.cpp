@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
 
 #include "emit/physics/constants.hpp"
 
@@ -18,35 +19,61 @@ constexpr double kNormalSteps = 2.0;
 
 }  // namespace
 
-std::uint32_t SightBuilder::patch_of(const RayHit& hit) {
-  const glm::dvec3 normal = hit.front ? hit.geometric_normal : -hit.geometric_normal;
-  const double wanted_m = std::max(kSmallestPatchM, kPatchPerDistance * hit.distance_m);
+std::uint32_t SightBuilder::patch_of(const RayHit& hit, const SceneInstant& instant,
+                                     double patch_factor) {
+  glm::dvec3 normal = hit.front ? hit.geometric_normal : -hit.geometric_normal;
+  glm::dvec3 place_m = hit.position_world_m;
+  // Cut entities into patches in their own frame.
+  const bool carried = hit.entity != kNoEntity;
+  if (carried) {
+    const physics::Pose& then = instant.entity_pose(hit.entity);
+    const glm::dquat body_from_world = glm::conjugate(then.world_from_body);
+    place_m = body_from_world * (place_m - then.position_world_m);
+    normal = body_from_world * normal;
+  }
+  const double wanted_m =
+      patch_factor * std::max(kSmallestPatchM, kPatchPerDistance * hit.distance_m);
   const double level = std::floor(std::log2(wanted_m / kSmallestPatchM));
   const double size_m = kSmallestPatchM * std::exp2(level);
   Key key{};
   key[0] = static_cast<std::int64_t>(level);
   for (int axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<std::size_t>(axis);
-    key[1 + a] = std::llround(std::floor(hit.position_world_m[axis] / size_m));
+    key[1 + a] = std::llround(std::floor(place_m[axis] / size_m));
     key[4 + a] = std::llround(kNormalSteps * normal[axis]);
   }
   key[7] = hit.material;
+  key[8] = carried ? static_cast<std::int64_t>(hit.entity) : -1;
   const auto [found, added] = index_.try_emplace(key, static_cast<std::uint32_t>(patches_.size()));
-  if (added)
-    patches_.push_back({hit.position_world_m, normal, hit.material, kNoEntity, hit.instance});
+  if (!added) return found->second;
+  if (carried) {
+    const physics::Pose& now = now_->entity_pose(hit.entity);
+    place_m = now.position_world_m + now.world_from_body * place_m;
+    normal = now.world_from_body * normal;
+  }
+  patches_.push_back({place_m, normal, hit.material, hit.entity, hit.instance});
   return found->second;
 }
 
-PointSight SightBuilder::add(const SolvePoint& point, std::span<const HemisphereRay> rays) {
+PointSight SightBuilder::add(const SolvePoint& point, std::span<const EpochRays> epochs,
+                             double patch_factor) {
   PointSight sight;
-  // A point that moves sees other patches at other times.
-  if (point.entity != kNoEntity || rays.empty()) return sight;
-  std::map<std::uint32_t, std::uint32_t> hits;
-  for (const HemisphereRay& ray : rays) {
-    if (ray.hit_surface && ray.hit.entity == kNoEntity) ++hits[patch_of(ray.hit)];
-  }
-  for (const auto& [patch, count] : hits) {
-    sight.links.push_back({patch, static_cast<double>(count) / static_cast<double>(rays.size())});
+  for (const EpochRays& epoch : epochs) {
+    SightEpoch& out = sight.epochs.emplace_back();
+    out.from_ns = epoch.from_ns;
+    std::map<std::uint32_t, std::uint32_t> hits;
+    for (const HemisphereRay& ray : epoch.rays) {
+      if (!ray.hit_surface) continue;
+      // What moves with the point is the same in every epoch.
+      const bool own = point.entity != kNoEntity && ray.hit.entity == point.entity;
+      const bool counts =
+          own || (ray.hit.entity == kNoEntity ? epoch.scenery : epoch.other_entities);
+      if (counts) ++hits[patch_of(ray.hit, *epoch.instant, patch_factor)];
+    }
+    for (const auto& [patch, count] : hits) {
+      out.links.push_back(
+          {patch, static_cast<double>(count) / static_cast<double>(epoch.rays.size())});
+    }
   }
   return sight;
 }
@@ -59,10 +86,17 @@ std::span<PatchRadiation> PatchHistories::of(std::size_t patch) noexcept {
 }
 
 void PatchHistories::add_to(std::span<ViewSample> views, const PointSight& sight) const {
-  double share = 0.0;
-  for (const SightLink& link : sight.links) share += link.share_frac;
-  if (!(share > 0.0)) return;
+  if (sight.epochs.empty()) return;
+  std::size_t epoch = 0;
   for (ViewSample& view : views) {
+    // Find the epoch of the view.
+    while (epoch + 1 < sight.epochs.size() && sight.epochs[epoch + 1].from_ns <= view.time_ns) {
+      ++epoch;
+    }
+    const std::vector<SightLink>& links = sight.epochs[epoch].links;
+    double share = 0.0;
+    for (const SightLink& link : links) share += link.share_frac;
+    if (!(share > 0.0)) continue;
     // Find the instants around the view's, between which patches are linear.
     const auto after = std::upper_bound(nodes_ns_.begin(), nodes_ns_.end(), view.time_ns);
     const auto b = std::clamp<std::ptrdiff_t>(after - nodes_ns_.begin(), 0,
@@ -76,7 +110,7 @@ void PatchHistories::add_to(std::span<ViewSample> views, const PointSight& sight
             : 0.0;
     double shortwave = 0.0;
     double longwave = 0.0;
-    for (const SightLink& link : sight.links) {
+    for (const SightLink& link : links) {
       const PatchRadiation* const all = radiation_.data() + link.patch * nodes_ns_.size();
       const PatchRadiation& x = all[low];
       const PatchRadiation& y = all[high];

@@ -18,16 +18,30 @@ namespace emit::reference {
 /// Patches that the rays of many points end on.
 class SightBuilder {
  public:
-  /// Adds the rays of a point's hemisphere. Entities and what lies below the horizon count as
-  /// surroundings, as they would without exchange.
-  [[nodiscard]] PointSight add(const SolvePoint& point, std::span<const HemisphereRay> rays);
+  /// Rays of a point's hemisphere in an epoch, and what of that counts. The rest, and what lies
+  /// below the horizon, count as surroundings, as they would without exchange.
+  struct EpochRays {
+    std::int64_t from_ns = 0;
+    const SceneInstant* instant = nullptr;  ///< of the rays
+    std::vector<HemisphereRay> rays;
+    bool other_entities = true;
+    bool scenery = true;
+  };
+
+  /// `now`: instant at which points are where they say.
+  explicit SightBuilder(const SceneInstant& now) : now_(&now) {}
+  /// Adds the rays of a point. `patch_factor` multiplies the size of the patches.
+  [[nodiscard]] PointSight add(const SolvePoint& point, std::span<const EpochRays> epochs,
+                               double patch_factor = 1.0);
   /// Returns the places that stand for the patches.
   [[nodiscard]] const std::vector<SolvePoint>& patches() const noexcept { return patches_; }
 
  private:
-  /// Level of the size, cell on three axes, normal in steps on three axes, material.
-  using Key = std::array<std::int64_t, 8>;
-  [[nodiscard]] std::uint32_t patch_of(const RayHit& hit);
+  /// Level of the size, cell on three axes, normal in steps on three axes, material, entity.
+  using Key = std::array<std::int64_t, 9>;
+  [[nodiscard]] std::uint32_t patch_of(const RayHit& hit, const SceneInstant& instant,
+                                       double patch_factor);
+  const SceneInstant* now_;
   std::map<Key, std::uint32_t> index_;
   std::vector<SolvePoint> patches_;
 };

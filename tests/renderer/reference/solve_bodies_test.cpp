@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <glm/ext/quaternion_double.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -52,7 +53,8 @@ TestScene box_scene(const scene::BodyInterior& interior, double sky_w_m2, bool e
   if (entity) {
     t.geometry.instances[0].entity_id = 7;
     t.scenario.objects[0].entity_id = 7;
-    t.scenario.objects[0].instances = {physics::Pose{{0.0, 0.0, 4.0}, {}}};
+    t.scenario.objects[0].instances = {
+        physics::Pose{{0.0, 0.0, 4.0}, glm::dquat(1.0, 0.0, 0.0, 0.0)}};
   }
   t.scenario.thermal.initial_k = kStartK;
   t.scenario.thermal.spin_up_ns = 0;
@@ -176,6 +178,65 @@ TEST(ReferenceInteriors, OfOneObjectHaveInteriorsOfTheirOwn) {
   // Faces of one placement have one interior.
   t.geometry.instances[1].placement = 0;
   EXPECT_GT(solved_k(t, 120 * kMinuteNs)[0], alone_k + 1.0);
+}
+
+TEST(ReferenceInteriors, AnEntityThatStandsExchangesRadiationLikeScenery) {
+  // A box stands over ground that is as warm as the day before, in the cold of a clear night.
+  const auto scene_of = [](bool entity) {
+    TestScene t = box_scene({}, 150.0, entity);
+    scene::Material ground = t.geometry.materials[0];
+    ground.name = "ground";
+    ground.emissivity_frac = 0.95;
+    ground.layers = {{0.5, 1.5, 2200.0, 900.0}};
+    ground.base = scene::BaseKind::air;
+    ground.base_k = kStartK;
+    t.geometry.materials.push_back(ground);
+    t.scenario.materials = t.geometry.materials;
+    scene::Mesh floor;
+    add_quad(floor, {{{-8, -8, 2.5}, {8, -8, 2.5}, {8, 8, 2.5}, {-8, 8, 2.5}}});
+    finish_mesh(t, std::move(floor), 1);
+    t.geometry.instances[1].object = 1;
+    t.scenario.objects.resize(2);
+    t.scenario.objects[1].name = "floor";
+    t.geometry.interiors.resize(2);
+    return t;
+  };
+  constexpr std::int64_t kNowNs = 120 * kMinuteNs;
+  const std::array<SolveProbe, 3> probes{{{{0.1, 0.2, 2.5}, glm::dvec3(0.0, 0.0, 1.0), "floor"},
+                                          {{0.1, 0.2, 3.0}, glm::dvec3(0.0, 0.0, -1.0), "box"},
+                                          {{0.0, -1.0, 3.3}, glm::dvec3(0.0, -1.0, 0.0), "box"}}};
+  const auto kelvin = [&](TestScene t, bool exchange) {
+    std::array<double, 3> all{};
+    t.scenario.thermal.exchange = exchange;
+    SolveOptions options;
+    options.dimension = SolveDimension::one;
+    options.rays = 128;
+    auto solver = SceneSolver::create(t.scenario, t.geometry, options, kNowNs);
+    EXPECT_TRUE(solver.has_value()) << (solver ? "" : solver.error().text);
+    if (!solver) return all;
+    const auto points = solver->probe(probes, kNowNs);
+    EXPECT_TRUE(points.has_value());
+    for (std::size_t i = 0; points && i < all.size(); ++i) all[i] = (*points)[i].temperature_k;
+    return all;
+  };
+  const auto scenery = kelvin(scene_of(false), true);
+  const auto entity = kelvin(scene_of(true), true);
+  const auto alone = kelvin(scene_of(true), false);
+  for (std::size_t i = 0; i < probes.size(); ++i) {
+    EXPECT_NEAR(entity[i], scenery[i], 0.03) << i;
+    EXPECT_GT(std::abs(scenery[i] - alone[i]), 0.5) << i;
+  }
+  // A box that came a minute ago has left the ground as it is without one.
+  TestScene came = scene_of(true);
+  const physics::Pose there{{0.0, 0.0, 4.0}, glm::dquat(1.0, 0.0, 0.0, 0.0)};
+  const physics::Pose away{{0.0, 500.0, 4.0}, glm::dquat(1.0, 0.0, 0.0, 0.0)};
+  came.scenario.objects[0].trajectory = {{0, away, true},
+                                         {kNowNs - kMinuteNs - 1'000'000'000, away, true},
+                                         {kNowNs - kMinuteNs, there, true}};
+  TestScene open = scene_of(true);
+  open.scenario.objects[0].instances = {away};
+  const auto now = kelvin(came, true);
+  EXPECT_NEAR(now[0], kelvin(open, true)[0], 0.25 * std::abs(scenery[0] - kelvin(open, true)[0]));
 }
 
 }  // namespace
