@@ -9,6 +9,7 @@
 #include "emit/physics/check.hpp"
 #include "emit/threads/parallel.hpp"
 #include "surface/mesh/sheet_sides.hpp"
+#include "surface/rays/held_faces.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -16,8 +17,9 @@ namespace {
 /// Views in one part of the lists.
 constexpr std::size_t kPartViews = 256;
 
-/// Largest number of samples in the list of a view: three corners for each seen face.
-constexpr std::size_t kMaxListed = 3 * SurfaceView::kMaxSeen;
+/// Largest number of samples in the list of a view: three corners for each seen face, and for each
+/// face of a prescribed temperature.
+constexpr std::size_t kMaxListed = 3 * (SurfaceView::kMaxSeen + HeldFaces::kMost);
 
 /// List of the samples that one view shows, each of them once, in the order in which they were met.
 /// It finds entries by a hash table with open addressing.
@@ -37,17 +39,17 @@ class SeenList {
       list_[slots_[slot]].weight_frac += weight_frac;
       return;
     }
-    EMIT_DCHECK_OP(count_, <, kMaxListed);
-    slots_[slot] = static_cast<std::uint8_t>(count_);
+    EMIT_CHECK_OP(count_, <, kMaxListed);
+    slots_[slot] = static_cast<std::uint16_t>(count_);
     list_[count_++] = {sample, weight_frac};
   }
   [[nodiscard]] std::span<const SeenSample> list() const noexcept { return {list_.data(), count_}; }
 
  private:
-  static constexpr unsigned kBits = 8;
-  static constexpr std::uint8_t kFree = 0xff;
+  static constexpr unsigned kBits = 10;
+  static constexpr std::uint16_t kFree = 0xffff;
   static_assert(2 * kMaxListed < (std::size_t{1} << kBits));
-  std::array<std::uint8_t, std::size_t{1} << kBits> slots_{};
+  std::array<std::uint16_t, std::size_t{1} << kBits> slots_{};
   std::array<SeenSample, kMaxListed> list_;
   std::size_t count_ = 0;
 };

@@ -126,6 +126,32 @@ TEST(RendererCachedArrival, ABodyThatComesToAHotWallIsWarmedByIt) {
   EXPECT_NEAR(came_k, stood_k, 0.03 * (stood_k - cold_k));
 }
 
+TEST(RendererCachedArrival, AHotWallInManyPiecesWarmsTheGroundAsOneInOnePieceDoes) {
+  // A surface sees each piece of a prescribed temperature apart, far more faces than by rays.
+  const auto beside_wall_k = [](int pieces) {
+    scene::ScenarioDesc s = night();
+    scene::Material hot = s.materials[0];
+    hot.name = "wall";
+    hot.prescribed_k = kHotBodyK;
+    s.materials.push_back(hot);
+    std::vector<Quad> quads;
+    const double width_m = 6.0 / pieces;
+    constexpr double kGapM = 1e-4;  // so that the pieces share no corners
+    for (int i = 0; i < pieces; ++i) {
+      const double south_m = -3.0 + i * width_m;
+      const double north_m = south_m + width_m - kGapM;
+      quads.push_back(
+          {{2.5, north_m, 0.0}, {2.5, south_m, 0.0}, {2.5, south_m, 4.0}, {2.5, north_m, 4.0}});
+    }
+    scene::ObjectDesc wall = s.objects.front();
+    wall.name = wall.material = "wall";
+    wall.gltf = write_quads("wall" + std::to_string(pieces), quads);
+    s.objects.push_back(wall);
+    return seen_k(s, {-0.5, 0.0, 2.0}, {0.5, 0.0, 0.0});
+  };
+  EXPECT_NEAR(beside_wall_k(30), beside_wall_k(1), 0.1);
+}
+
 TEST(RendererCachedArrival, AHotBodyThatComesWarmsOneThatStandsThere) {
   scene::ScenarioDesc s = night();
   add_box(s, 7);
