@@ -178,10 +178,14 @@ SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs,
     eyes_.push_back(
         {glm::vec3(eye.world_m - inputs.rays.origin_world_m()), glm::vec3(eye.boresight)});
   }
+  // An entity that no script moves from here on may be brought anywhere by the host: take it for in
+  // view, at the distance that it has now.
   for (const std::vector<glm::vec3>& way_m : inputs.ways_m) {
+    const bool planned = way_m.size() > 1;
     std::vector<Eye>& eyes = eyes_of_entity_.emplace_back();
     for (const Eye& eye : eyes_) {
-      eyes.push_back({when_in_view(eye.rel_m, eye.boresight, way_m), eye.boresight});
+      eyes.push_back({when_in_view(eye.rel_m, eye.boresight, way_m),
+                      planned ? eye.boresight : glm::vec3(0.0F)});
     }
   }
   for (const scene::Instance& instance : inputs.geometry.instances) {

@@ -104,7 +104,8 @@ class SurfaceRefinement {
   SurfaceBend bend_;
   std::vector<Eye> eyes_;
   /// Places of the camera relative to each entity where its script brings it closest to the
-  /// middle of the image, moved so that the entity may stay where it is.
+  /// middle of the image, moved so that the entity may stay where it is. They look all around an
+  /// entity that no script moves.
   std::vector<std::vector<Eye>> eyes_of_entity_;
   std::vector<float> body_m_;  ///< by instance: width of its body
   float pixel_rad_ = 1e-3F;

@@ -230,5 +230,46 @@ TEST(RendererCachedLive, FacesOfABodyThatTheHostTurnsFollowTheSun) {
   EXPECT_GT(difference(expected.back(), never.back()).p99_k, 3.0);
 }
 
+TEST(RendererCachedLive, ABodyThatTheHostBringsIntoViewHasItsDetailAsIfTheScriptDid) {
+  // A box with a fin that shades its lid stands below the view, as far from the camera as the place
+  // in view to which it moves.
+  auto live = cached_scenario(write_quads("ground", {ground(60.0, 60.0)}));
+  auto quads = box({-2.0, -2.0, 0.2}, {2.0, 2.0, 1.2});
+  for (const Quad& quad : box({-0.2, -1.5, 1.2}, {0.2, 1.5, 2.7})) quads.push_back(quad);
+  scene::ObjectDesc body = live.objects.front();
+  body.name = "body";
+  body.gltf = write_quads("body", quads);
+  body.entity_id = 7;
+  constexpr double kBelowM = -18.0;
+  constexpr std::int64_t kBeginNs = 2 * kHourNs + 3 * kSecondNs;
+  constexpr std::int64_t kEndNs = kBeginNs + 8 * kSecondNs;
+  const auto moved = [&](std::int64_t at_ns) {
+    physics::Pose pose = live.objects.front().instances.front();
+    const double left_frac = std::clamp(
+        static_cast<double>(kEndNs - at_ns) / static_cast<double>(kEndNs - kBeginNs), 0.0, 1.0);
+    pose.position_world_m.y = kBelowM * left_frac;
+    return pose;
+  };
+  body.instances = {moved(kBeginNs)};
+  live.objects.push_back(body);
+  auto scripted = live;
+  scripted.objects.back().trajectory = {
+      {0, moved(kBeginNs)}, {kBeginNs, moved(kBeginNs)}, {kEndNs, moved(kEndNs)}};
+  const auto eye = looking({1.0, -9.0, 16.0}, {0.0, 0.0, 1.2});
+  const auto last_frame = [&](const scene::ScenarioDesc& scenario, bool by_host) {
+    Session session(scenario);
+    std::vector<float> frame;
+    for (std::int64_t now_ns = 2 * kHourNs; now_ns <= kEndNs + 2 * kSecondNs;
+         now_ns += kSecondNs / 4) {
+      if (by_host) tell(session, now_ns, moved(now_ns));
+      frame = session.frame_k(now_ns, eye);
+    }
+    return frame;
+  };
+  const auto by_script = last_frame(scripted, false);
+  const auto by_host = last_frame(live, true);
+  EXPECT_LT(difference(by_script, by_host).p99_k, 0.3);
+}
+
 }  // namespace
 }  // namespace emit::test
