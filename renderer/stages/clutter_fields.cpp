@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -22,39 +23,31 @@ bool same_field(const scene::Clutter& a, const scene::Clutter& b) noexcept {
 
 static_assert(scene::Clutter::kSide == EMIT_CLUTTER_SIDE);
 constexpr std::size_t kSide = EMIT_CLUTTER_SIDE;
-constexpr std::size_t kColumns = kSide + kSide / 4 * 3;
-constexpr std::size_t kRows = 2 * kSide;
+constexpr std::size_t kLevels = EMIT_CLUTTER_LEVELS;
+constexpr std::size_t kHead = ClutterFields::kMost * kLevels;
+/// A level begins at a multiple of as many texels.
+constexpr std::size_t kAlign = 4;
 
-struct Texel {
-  std::uint32_t upper = 0;  ///< the texel and its neighbour in the row
-  std::uint32_t lower = 0;  ///< the same of the next row
-};
-
-/// Value in steps of 14 bits.
-std::uint32_t steps_of(float sd) noexcept {
-  constexpr double kMiddle = 8191.5;
-  const double steps = kMiddle * (1.0 + static_cast<double>(sd) / scene::Clutter::kMostSd);
-  return static_cast<std::uint32_t>(std::lround(std::clamp(steps, 0.0, 2.0 * kMiddle)));
+/// Value within the field's bounds, as the upper half of a float32, rounded to the nearest.
+std::uint32_t short_float(float sd) noexcept {
+  constexpr auto kMost = static_cast<float>(scene::Clutter::kMostSd);
+  return (std::bit_cast<std::uint32_t>(std::clamp(sd, -kMost, kMost)) + 0x8000U) >> 16U;
 }
 
-/// Places the levels of a field as passes/clutter.glsl reads them.
-void place(std::span<const physics::FieldLevel> levels, std::span<Texel> out) {
-  EMIT_CHECK_OP(levels.size(), ==, std::size_t{EMIT_CLUTTER_LEVELS});
+/// Appends the levels of a field as passes/clutter.glsl reads them.
+void append(std::span<const physics::FieldLevel> levels, std::size_t field,
+            std::vector<std::uint32_t>& out) {
+  EMIT_CHECK_OP(levels.size(), ==, kLevels);
   for (std::size_t l = 0; l < levels.size(); ++l) {
     const physics::FieldLevel& level = levels[l];
-    const std::size_t pair = l / 2;
-    const std::size_t first_x = l % 2 == 0 ? 0 : kSide >> pair;
-    const std::size_t first_y = 2 * kSide - (2 * kSide >> pair);
     const auto lost =
         static_cast<std::uint32_t>(std::lround(255.0 * std::clamp(1.0 - level.variance, 0.0, 1.0)));
-    const auto steps = [&](std::size_t x, std::size_t y) {
-      return steps_of(level.values[(y % level.side) * level.side + x % level.side]);
-    };
-    for (std::size_t y = 0; y < level.side; ++y) {
+    out.resize((out.size() + kAlign - 1) / kAlign * kAlign);
+    out[field * kLevels + l] = static_cast<std::uint32_t>(out.size() / kAlign) << 8U | lost;
+    for (std::size_t y = 0; y <= level.side; ++y) {
+      const float* row = &level.values[y % level.side * level.side];
       for (std::size_t x = 0; x < level.side; ++x) {
-        const auto row = [&](std::size_t v) { return steps(x, v) | steps(x + 1, v) << 14U; };
-        out[(first_y + y) * kColumns + first_x + x] = {row(y) | (lost & 15U) << 28U,
-                                                       row(y + 1) | lost >> 4U << 28U};
+        out.push_back(short_float(row[x]) << 16U | short_float(row[(x + 1) % level.side]));
       }
     }
   }
@@ -86,22 +79,28 @@ physics::Result<ClutterFields> ClutterFields::build(std::span<const scene::Mater
                                            "different fields: {} are possible",
                                            fields.size(), kMost));
   }
-  out.texture_ = gl::Texture(GL_RG32UI, static_cast<GLsizei>(kColumns),
-                             static_cast<GLsizei>(kRows * fields.size()));
-  std::vector<Texel> texels(kColumns * kRows);
+  std::vector<std::uint32_t> texels(kHead);
   for (std::size_t i = 0; i < fields.size(); ++i) {
     const scene::Clutter& clutter = *fields[i];
-    place(physics::power_law_field({.period_m = clutter.period_m(),
-                                    .shortest_m = clutter.shortest_m,
-                                    .longest_m = clutter.longest_m,
-                                    .slope = clutter.slope,
-                                    .seed = clutter.seed},
-                                   kSide),
-          texels);
-    glTextureSubImage2D(out.texture_.id(), 0, 0, static_cast<GLint>(i * kRows),
-                        static_cast<GLsizei>(kColumns), static_cast<GLsizei>(kRows), GL_RG_INTEGER,
-                        GL_UNSIGNED_INT, texels.data());
+    append(physics::power_law_field({.period_m = clutter.period_m(),
+                                     .shortest_m = clutter.shortest_m,
+                                     .longest_m = clutter.longest_m,
+                                     .slope = clutter.slope,
+                                     .seed = clutter.seed},
+                                    kSide),
+           i, texels);
   }
+  // OpenGL promises 65536 texels; every driver known takes a thousand times as many.
+  GLint most_texels = 0;
+  glGetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &most_texels);
+  if (texels.size() > static_cast<std::size_t>(std::max(most_texels, 0))) {
+    return physics::make_error(physics::ErrorCode::gpu,
+                               fmt::format("[[clutter]]: the fields have {} texels: the device "
+                                           "takes {} in a buffer texture",
+                                           texels.size(), most_texels));
+  }
+  out.buffer_ = gl::Buffer::from(std::span<const std::uint32_t>(texels));
+  out.texture_ = gl::BufferTexture(GL_R32UI, out.buffer_);
   return out;
 }
 

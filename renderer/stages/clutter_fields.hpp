@@ -10,20 +10,21 @@
 
 namespace emit::renderer {
 
-/// Fields of the clutter of a scene on the device (passes/clutter.glsl), one below the other in a
-/// texture. Owner: Renderer. Thread: the one that owns the GL context. Real time: build() is setup
-/// only, the rest is RT-safe.
+/// Fields of the clutter of a scene on the device (passes/clutter.glsl), one behind the other in a
+/// buffer texture. Owner: Renderer. Thread: the one that owns the GL context. Real time: build() is
+/// setup only, the rest is RT-safe.
 class ClutterFields {
  public:
-  /// Largest number of different fields: every OpenGL 4.5 device takes textures that high.
-  static constexpr std::size_t kMost = 16384 / (2 * EMIT_CLUTTER_SIDE);
+  /// Largest number of different fields: they have 9 MB each.
+  static constexpr std::size_t kMost = EMIT_CLUTTER_FIELDS;
 
   /// Makes the field of each material with clutter. Materials of the same field share it. Errors:
-  /// config (more than kMost different fields).
+  /// config (more than kMost different fields); gpu (the device takes no buffer texture of their
+  /// size).
   [[nodiscard]] static physics::Result<ClutterFields> build(
       std::span<const scene::Material> materials);
 
-  [[nodiscard]] bool empty() const noexcept { return texture_.id() == 0; }
+  [[nodiscard]] bool empty() const noexcept { return buffer_.id() == 0; }
   /// True if the emissivity of some material varies.
   [[nodiscard]] bool change_emissivity() const noexcept { return emissivity_; }
   /// Returns by material how its draws use the fields.
@@ -33,7 +34,8 @@ class ClutterFields {
  private:
   std::vector<DrawnClutter> drawn_;
   bool emissivity_ = false;
-  gl::Texture texture_;
+  gl::Buffer buffer_;
+  gl::BufferTexture texture_;
 };
 
 }  // namespace emit::renderer

@@ -51,8 +51,9 @@ uvec4 packed_clutter() {
   float axis2 = dot(axis, axis);
   vec2 longer = axis2 > 0.0 ? axis * sqrt(longer2 / axis2) : vec2(sqrt(longer2), 0.0);
   float width_frac = min(abs(a.x * b.y - a.y * b.x) / longer2, 1.0);
-  uvec2 steps = uvec2(fract(place) * EMIT_CLUTTER_PLACE_STEPS) << 8;
-  return uvec4(steps.x | uint(width_frac * 255.0 + 0.5), steps.y | draw.field,
+  // Convert to signed integers first: software rasterisers take an instruction for that, and several for unsigned ones.
+  uvec2 steps = uvec2(ivec2(fract(place) * EMIT_CLUTTER_PLACE_STEPS)) << 8;
+  return uvec4(steps.x | uint(int(width_frac * 255.0 + 0.5)), steps.y | draw.field,
                packed_short_floats(longer), packed_short_floats(clutter_k));
 }
 #endif

@@ -101,11 +101,11 @@
 #define EMIT_GAS_SAMPLES_SHIFT 2u
 #define EMIT_GAS_FAR_M 1e7f
 
-// Clutter: texels along the edge of a tile, levels of a field, its largest magnitude, places in a pixel at which it is
-// taken at most, and the value at which twins of samples are solved.
+// Clutter: different fields at most, texels along the edge of a tile, levels of a field, places in a pixel at which it
+// is taken at most, and the value at which twins of samples are solved.
+#define EMIT_CLUTTER_FIELDS 8
 #define EMIT_CLUTTER_SIDE 1024
 #define EMIT_CLUTTER_LEVELS 17
-#define EMIT_CLUTTER_MOST_SD 4.0
 #define EMIT_CLUTTER_TAPS 8
 #define EMIT_CLUTTER_TWIN_SD 1.5
 // Steps of a place in a tile, of 24 bits.
