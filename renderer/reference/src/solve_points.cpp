@@ -111,8 +111,10 @@ class PointHistories::Run {
       SightBuilder::EpochRays& rays = out.emplace_back();
       rays.from_ns = nodes_ns_[epoch.first];
       rays.instant = &instants_[node];
-      rays.other_entities = !epoch.brief;
-      rays.scenery = !epoch.brief || !epoch.own_moves;
+      // An entity that is switched off stands in the open.
+      const bool on = point.entity == kNoEntity || instants_[node].entity_on(point.entity);
+      rays.other_entities = on && !epoch.brief;
+      rays.scenery = on && (!epoch.brief || !epoch.own_moves);
       rays.rays.resize(std::max(kLeastSightRays, all_.rays_ / kRaysPerSightRay));
       SurfacePoint place = carried.at(instants_[node]);
       place.tolerance_m = 1e-9;

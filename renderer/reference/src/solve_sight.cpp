@@ -64,7 +64,7 @@ PointSight SightBuilder::add(const SolvePoint& point, std::span<const EpochRays>
     std::map<std::uint32_t, std::uint32_t> hits;
     for (const HemisphereRay& ray : epoch.rays) {
       if (!ray.hit_surface) continue;
-      // What moves with the point is the same in every epoch.
+      // The point sees the same of its own entity in every epoch.
       const bool own = point.entity != kNoEntity && ray.hit.entity == point.entity;
       const bool counts =
           own || (ray.hit.entity == kNoEntity ? epoch.scenery : epoch.other_entities);

@@ -9,7 +9,7 @@
 #include "emit/reference/visibility.hpp"
 #include "solve_points.hpp"
 
-/// What points of the one-dimensional solution see of sun, sky and scene over their history.
+/// Views that points of the one-dimensional solution have of sun, sky and scene over their history.
 namespace emit::reference {
 
 /// Point that goes with its entity, if it has one.
