@@ -147,6 +147,52 @@ TEST_P(LayerStacks, StoreWhatFlowsIn) {
   }
 }
 
+TEST_P(LayerStacks, KeepTheirBalanceOverABaseThatMoves) {
+  const LayerMesh mesh = mesh_of(*GetParam(), {BaseKind::fixed_temperature, 286.0});
+  LayerSolver solver(mesh);
+  const ProfilePoint start[] = {{0.0, 280.0}, {0.05, 291.0}};
+  solver.start(start, 0.0);
+  const double before = solver.stored_heat_j_m2();
+  const FaceState night{300.0, 12.0, 281.0};
+  const FaceState noon{900.0, 20.0, 295.0};
+  solver.move_base(286.0, 2e-3);
+  solver.advance({0.0, 3600.0, night, noon}, kEmissivity);
+  solver.move_base(300.0, -1e-3);  // a jump, too
+  solver.advance({3600.0, 9000.0, noon, noon}, kEmissivity);
+  EXPECT_NEAR(solver.temperature_k(mesh.depth_m().back()), 300.0 - 5.4, 1e-9);
+  const double stored = solver.stored_heat_j_m2() - before;
+  ASSERT_GT(std::abs(stored), 1.0e4);
+  EXPECT_NEAR(solver.heat_in_j_m2() / stored, 1.0, 1e-9);
+}
+
+TEST(LayerBase, RisesEvenlyAndTheSlabFollowsAsTheClosedFormSays) {
+  // Insulated at its face, a slab over a base that rises at the rate r lags behind it by
+  // r (L^2 - z^2)/(2 a), and takes the heat rho c L r from below.
+  constexpr double kThickM = 0.1;
+  constexpr double kConductivity = 1.2;
+  constexpr double kCapacity = 2.0e6;
+  constexpr double kRate = 1e-3;
+  const LayerMesh mesh =
+      mesh_of({{kThickM, kConductivity, kCapacity}}, {BaseKind::fixed_temperature, 280.0});
+  LayerSolver solver(mesh);
+  const ProfilePoint start[] = {{0.0, 280.0}};
+  solver.start(start, 0.0);
+  solver.move_base(280.0, kRate);
+  const FaceState insulated{0.0, 0.0, 0.0};
+  constexpr double kSettledS = 200'000.0;
+  solver.advance({0.0, kSettledS, insulated, insulated}, 0.0);
+  const double lag = kRate * kCapacity / (2.0 * kConductivity);
+  for (const double depth_m : {0.0, 0.03, 0.07}) {
+    EXPECT_NEAR(solver.temperature_k(depth_m),
+                280.0 + kRate * kSettledS - lag * (kThickM * kThickM - depth_m * depth_m), 2e-3)
+        << depth_m;
+  }
+  const double out_j_m2 = solver.heat_out_of_base_j_m2();
+  solver.advance({kSettledS, kSettledS + 1000.0, insulated, insulated}, 0.0);
+  EXPECT_NEAR((solver.heat_out_of_base_j_m2() - out_j_m2) / (-kCapacity * kThickM * kRate * 1000.0),
+              1.0, 1e-5);
+}
+
 TEST_P(LayerStacks, InsulatedBodyTakesExactlyTheGivenHeat) {
   const LayerMesh mesh = mesh_of(*GetParam(), {BaseKind::adiabatic, 0.0});
   LayerSolver solver(mesh);
