@@ -198,8 +198,8 @@ Result<void> SceneSolver::Data::choose_dimension(bool& three) {
       geometry.instances, [](const scene::Instance& instance) { return instance.entity_id != 0; });
   if (scenario.thermal.exchange && moving) {
     notes.emplace_back(
-        "in one dimension thermal.exchange leaves out objects while they move: what they see and "
-        "what they send count as surroundings of environment temperature");
+        "in one dimension thermal.exchange leaves out objects while they move, and their parts of "
+        "prescribed temperature: what they send counts as surroundings of environment temperature");
   }
   if (!scenario.contacts.empty()) {
     notes.emplace_back("in one dimension [[contact]] has no effect: no body conducts to another");

@@ -119,6 +119,14 @@ class PointHistories::Run {
       SurfacePoint place = carried.at(instants_[node]);
       place.tolerance_m = 1e-9;
       instants_[node].hemisphere(place, rays.rays);
+      // A part of a prescribed temperature may be small and hot, so that a single ray would stand
+      // for far more than it is.
+      for (HemisphereRay& ray : rays.rays) {
+        const bool entity = ray.hit_surface && ray.hit.entity != kNoEntity;
+        if (entity && all_.geometry_.materials[ray.hit.material].prescribed_k) {
+          ray.hit_surface = false;
+        }
+      }
     }
     return out;
   }
