@@ -90,7 +90,7 @@ physics::Result<ClutterFields> ClutterFields::build(std::span<const scene::Mater
                                     kSide),
            i, texels);
   }
-  // OpenGL promises 65536 texels; every driver known takes a thousand times as many.
+  // OpenGL promises no more than 65536 texels.
   GLint most_texels = 0;
   glGetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &most_texels);
   if (texels.size() > static_cast<std::size_t>(std::max(most_texels, 0))) {

@@ -219,7 +219,7 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
     SampleAdvance one{&sample, normal, drive, &stepped.state, back, {}};
     step.heat.advance_all({&one, 1}, interval);
     stepped.output = one.output;
-    // What drives a sample is smooth while nothing changes suddenly: its steps between intervals
+    // The drive of a sample is smooth while nothing changes suddenly: its steps between intervals
     // are those of the rays then. The shade of an entity comes at any time of the interval.
     const bool sudden = interval.after_weather && sun.frac == sun.fixed_frac;
     stepped.bow_k = sudden ? static_cast<float>(one.bow_k) : 0.0F;
