@@ -175,12 +175,12 @@ bool BodyInteriors::balance(std::size_t bodies, const Carry& carry,
   std::vector<std::vector<double>> out_j_m2(body_of.size());
   for (auto& row : out_j_m2) row.resize(nodes_ns_.size());
   double first_change_k = 0.0;
-  left_k_ = 0.0;
+  double change_k = 0.0;
   for (int round = 0; round < kMostRounds && !body_of.empty(); ++round) {
     threads::parallel_indices(std::size_t{0}, body_of.size(), [&](std::size_t p) {
       carry(p, bodies_[body_of[p]].course, out_j_m2[p]);
     });
-    left_k_ = 0.0;
+    change_k = 0.0;
     for (std::size_t b = 0; b < bodies; ++b) {
       Body& body = bodies_[b];
       std::vector<double> mean_j_m2(nodes_ns_.size(), 0.0);
@@ -189,16 +189,17 @@ bool BodyInteriors::balance(std::size_t bodies, const Carry& carry,
           mean_j_m2[n] += out_j_m2[p][n] / static_cast<double>(body.count);
         }
       }
-      left_k_ = std::max(left_k_, follow(body, mean_j_m2));
+      change_k = std::max(change_k, follow(body, mean_j_m2));
     }
-    if (left_k_ <= kSettledK) break;
+    if (change_k <= kSettledK) break;
     // Changes fall by a constant factor from round to round.
-    if (round == 0) first_change_k = left_k_;
+    if (round == 0) first_change_k = change_k;
     const double share =
         round == 0 ? 0.1
-                   : std::log(first_change_k / left_k_) / std::log(first_change_k / kSettledK);
+                   : std::log(first_change_k / change_k) / std::log(first_change_k / kSettledK);
     if (done && !done(std::clamp(share, 0.0, 1.0))) return false;
   }
+  left_k_ = std::max(left_k_, change_k);
   return !done || done(1.0);
 }
 

@@ -49,7 +49,7 @@ class BodyInteriors {
   /// with the share done; a return of false stops the work. Returns false then.
   [[nodiscard]] bool balance(std::size_t bodies, const Carry& carry,
                              const std::function<bool(double)>& done);
-  /// Returns the largest change of an interior in the last round of the last balance, K.
+  /// Returns the largest change of an interior in the last round of any balance, K.
   [[nodiscard]] double left_k() const noexcept { return left_k_; }
 
  private:

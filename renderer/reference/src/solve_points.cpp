@@ -299,7 +299,6 @@ Result<PointSolution> PointHistories::temperatures(std::span<const SolvePoint> p
   const std::vector<SolvePoint>& places = sight.patches();
   if (auto built = run.add_meshes(places); !built) return tl::unexpected(std::move(built.error()));
   run.bodies().add(places, kPointsPerSeenBody);
-  solution.bodies = run.bodies().size();
   const std::span<const SolvePoint> body_points = run.bodies().points();
   if (auto built = run.add_meshes(body_points); !built) {
     return tl::unexpected(std::move(built.error()));

@@ -55,7 +55,6 @@ struct PointSolution {
   std::vector<PointSight> sights;  ///< one per point; without links if there is no exchange
   std::vector<std::uint32_t> patch_material;
   std::vector<PatchState> patches;
-  std::size_t bodies = 0;        ///< number of interiors that were solved
   double interior_left_k = 0.0;  ///< largest change of an interior in the last round
 };
 
