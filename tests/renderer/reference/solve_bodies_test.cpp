@@ -233,6 +233,12 @@ TEST(ReferenceInteriors, AnEntityThatStandsExchangesRadiationLikeScenery) {
   came.scenario.objects[0].trajectory = {{0, away, true},
                                          {kNowNs - kMinuteNs - 1'000'000'000, away, true},
                                          {kNowNs - kMinuteNs, there, true}};
+  // One that has just left is remembered, though the picture no longer shows it.
+  TestScene left = came;
+  left.scenario.objects[0].trajectory = {{0, there, true},
+                                         {kNowNs - kMinuteNs - 1'000'000'000, there, true},
+                                         {kNowNs - kMinuteNs, away, true}};
+  EXPECT_GT(kelvin(left, true)[0] - kelvin(left, false)[0], 0.5 * (scenery[0] - alone[0]));
   TestScene open = scene_of(true);
   open.scenario.objects[0].instances = {away};
   const auto now = kelvin(came, true);
