@@ -1,33 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "history/entity_air.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <glm/common.hpp>
-#include <limits>
 
 namespace emit::renderer {
-
-physics::AirFilmBody entity_film_body(const scene::ScenarioDesc& scenario,
-                                      const scene::SceneGeometry& geometry, std::size_t object) {
-  physics::AirFilmBody body = scenario.objects[object].air_film;
-  if (body.length_m > 0.0) return body;
-  // Take the box around all meshes of the object in body axes.
-  glm::dvec3 low(std::numeric_limits<double>::max());
-  glm::dvec3 high(std::numeric_limits<double>::lowest());
-  for (const scene::Instance& instance : geometry.instances) {
-    if (instance.object != object) continue;
-    for (const glm::vec3& p_mesh_m : geometry.meshes[instance.mesh].positions_m) {
-      const glm::dvec3 p_body_m(instance.body_from_mesh * glm::dvec4(p_mesh_m, 1.0));
-      low = glm::min(low, p_body_m);
-      high = glm::max(high, p_body_m);
-    }
-  }
-  constexpr double kShortestM = 0.01;
-  const glm::dvec3 size_m = high - low;
-  body.length_m = std::max({size_m.x, size_m.y, size_m.z, kShortestM});
-  return body;
-}
 
 EntityAir entity_air(const PoseHistory& entity, const IntervalForcing& forcing,
                      std::int64_t begin_ns, std::int64_t end_ns) noexcept {

@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <cstddef>
 #include <cstdint>
-#include <span>
 
 #include "emit/physics/air_film.hpp"
 #include "emit/renderer/surface_forcing.hpp"
-#include "emit/scene/mesh.hpp"
 #include "history/pose_history.hpp"
 
 namespace emit::renderer {
@@ -21,12 +18,6 @@ struct EntityAir {
   physics::MoistAir begin_moist;
   physics::MoistAir end_moist;
 };
-
-/// Returns shape and length of an entity's flow: the user's, or the longest side of the box around
-/// its geometry, at least 1 cm. `object` is an index into the scenario's objects. Setup only.
-[[nodiscard]] physics::AirFilmBody entity_film_body(const scene::ScenarioDesc& scenario,
-                                                    const scene::SceneGeometry& geometry,
-                                                    std::size_t object);
 
 /// Returns the air past an entity over an interval of the thermal history: the wind less its own
 /// speed, at its height above the place. The relative humidity is that of the ground. RT-safe.

@@ -347,7 +347,7 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
     if (object.entity_id == 0) continue;
     entity_ids_.push_back(object.entity_id);
     history_.entities.emplace_back(object, object.instances.front(),
-                                   entity_film_body(scenario_, geometry, i));
+                                   scene::film_body(scenario_, geometry, i));
   }
   history_.parts = make_part_histories(scenario_, geometry, scene_stats_.warnings);
   if (const physics::CloudField* clouds = history_.environment.clouds()) {

@@ -98,6 +98,10 @@ struct SceneSolver::Data {
   std::vector<std::string> notes;
 
   void lengthen_history(bool three);
+  /// Returns the start of the scenario's own history in one dimension.
+  [[nodiscard]] std::int64_t fine_from_ns() const {
+    return scenario.thermal.history_start_ns + std::llround(spin_up_s * 1e9);
+  }
   Result<void> start_solid();
   Result<std::vector<PixelHit>> see(const SolveView& view, SolvedImage& image,
                                     std::vector<glm::dvec3>& sky_rays) const;
@@ -143,6 +147,7 @@ Result<SceneSolver> SceneSolver::create(const scene::ScenarioDesc& scenario,
   data->rays.emplace(std::move(*rays));
   ClimateOptions climate_options;
   climate_options.end_ns = std::max(end_ns, scenario.thermal.history_start_ns + 1);
+  if (!three) climate_options.fine_from_ns = data->fine_from_ns();
   auto climate = SurfaceClimate::create(data->scenario, climate_options);
   if (!climate) return tl::unexpected(std::move(climate.error()));
   data->climate.emplace(std::move(*climate));
@@ -198,8 +203,8 @@ Result<void> SceneSolver::Data::choose_dimension(bool& three) {
       geometry.instances, [](const scene::Instance& instance) { return instance.entity_id != 0; });
   if (scenario.thermal.exchange && moving) {
     notes.emplace_back(
-        "in one dimension thermal.exchange leaves out objects while they move, and their parts of "
-        "prescribed temperature: what they send counts as surroundings of environment temperature");
+        "in one dimension thermal.exchange leaves out objects while they move: what they send "
+        "counts as surroundings of environment temperature");
   }
   if (!scenario.contacts.empty()) {
     notes.emplace_back("in one dimension [[contact]] has no effect: no body conducts to another");
@@ -207,8 +212,8 @@ Result<void> SceneSolver::Data::choose_dimension(bool& three) {
   return {};
 }
 
-/// Names what the solution does not follow: gloss, parts that heat themselves, the air past moving
-/// or shaped objects, and in three dimensions the interiors of bodies.
+/// Names what the solution does not follow: gloss, parts that heat themselves, and in three
+/// dimensions the air past moving or shaped objects and the interiors of bodies.
 void SceneSolver::Data::note_simpler_physics(bool three) {
   for (const scene::Material& material : geometry.materials) {
     if (!material.gloss) continue;
@@ -226,7 +231,7 @@ void SceneSolver::Data::note_simpler_physics(bool three) {
   }
   for (const scene::ObjectDesc& object : scenario.objects) {
     const bool moves = object.trajectory.size() > 1;
-    if (moves || object.air_film.shape != physics::AirFilmShape::surface) {
+    if (three && (moves || object.air_film.shape != physics::AirFilmShape::surface)) {
       notes.push_back(fmt::format(
           "object '{}': its film is that of scenery in the wind, without its own speed{}",
           object.name, moves ? "" : " and 'air_film'"));
@@ -469,6 +474,10 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
         for (const SightLink& link : points.sights[i].now()) {
           incoming += link.share_frac * patch[link.patch];
         }
+        for (const PartLink& link : points.sights[i].parts_now()) {
+          const scene::Material& part = geometry.materials[link.material];
+          incoming += link.share_frac * band.emissivity(part) * band.black(*part.prescribed_k);
+        }
       }
       // Add emission and reflection, then pass the air to the camera.
       const BandRadiance::Leaving leaving{e * band.black(kelvin[i]) + (1.0 - e) * incoming,
@@ -524,8 +533,7 @@ Result<std::vector<double>> SceneSolver::Data::temperatures(std::vector<PixelHit
     hits.swap(on_model);
     return their_k;
   }
-  const PointHistories histories(scenario, geometry, *rays, *climate, options.rays,
-                                 scenario.thermal.history_start_ns + std::llround(spin_up_s * 1e9));
+  const PointHistories histories(scenario, geometry, *rays, *climate, options.rays, fine_from_ns());
   std::vector<SolvePoint> places;
   for (const PixelHit& hit : hits) places.push_back(hit.point);
   auto solved = histories.temperatures(places, sim_time_ns, [&](double share) {
@@ -569,6 +577,7 @@ Result<SolvedImage> SceneSolver::image(const SolveView& view) {
                              .sky_cosine.value_frac;
       double known_frac = hits[i].sky_frac;
       for (const SightLink& link : d.points.sights[i].now()) known_frac += link.share_frac;
+      for (const PartLink& link : d.points.sights[i].parts_now()) known_frac += link.share_frac;
       hits[i].ground_frac = std::max(0.0, 1.0 - known_frac);
     });
   }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <limits>
 #include <numeric>
 
 #include "emit/physics/check.hpp"
@@ -176,12 +177,16 @@ bool BodyInteriors::balance(std::size_t bodies, const Carry& carry,
   for (auto& row : out_j_m2) row.resize(nodes_ns_.size());
   double first_change_k = 0.0;
   double change_k = 0.0;
+  // A body whose interior has settled is left as it is: no other one depends on it.
+  std::vector<double> body_change_k(bodies, std::numeric_limits<double>::infinity());
   for (int round = 0; round < kMostRounds && !body_of.empty(); ++round) {
     threads::parallel_indices(std::size_t{0}, body_of.size(), [&](std::size_t p) {
-      carry(p, bodies_[body_of[p]].course, out_j_m2[p]);
+      const std::size_t b = body_of[p];
+      if (body_change_k[b] > kSettledK) carry(p, bodies_[b].course, out_j_m2[p]);
     });
     change_k = 0.0;
     for (std::size_t b = 0; b < bodies; ++b) {
+      if (!(body_change_k[b] > kSettledK)) continue;
       Body& body = bodies_[b];
       std::vector<double> mean_j_m2(nodes_ns_.size(), 0.0);
       for (std::size_t p = body.first; p < body.first + body.count; ++p) {
@@ -189,7 +194,8 @@ bool BodyInteriors::balance(std::size_t bodies, const Carry& carry,
           mean_j_m2[n] += out_j_m2[p][n] / static_cast<double>(body.count);
         }
       }
-      change_k = std::max(change_k, follow(body, mean_j_m2));
+      body_change_k[b] = follow(body, mean_j_m2);
+      change_k = std::max(change_k, body_change_k[b]);
     }
     if (change_k <= kSettledK) break;
     // Changes fall by a constant factor from round to round.

@@ -15,8 +15,10 @@
 
 #include "emit/reference/surface_water.hpp"
 #include "emit/threads/parallel.hpp"
+#include "solve_air.hpp"
 #include "solve_bodies.hpp"
 #include "solve_sight.hpp"
+#include "solve_sources.hpp"
 #include "solve_views.hpp"
 
 namespace emit::reference {
@@ -68,12 +70,14 @@ PointHistories::PointHistories(const scene::ScenarioDesc& scenario,
 /// Solution of one instant: nodes, meshes and solvers that its points share.
 class PointHistories::Run {
  public:
-  Run(const PointHistories& all, std::int64_t sim_time_ns) : all_(all) {
+  Run(const PointHistories& all, std::int64_t sim_time_ns)
+      : all_(all), parts_(all.geometry_, all.scene_) {
     nodes_ns_ = view_nodes(all.scene_, all.climate_, all.dense_from_ns_, sim_time_ns);
     instants_.reserve(nodes_ns_.size());
     for (const std::int64_t t : nodes_ns_) instants_.push_back(all.scene_.at(t));
     bodies_.emplace(all.scenario_, all.geometry_, all.scene_, all.climate_, nodes_ns_,
                     instants_.back());
+    courses_.emplace(all.scenario_, all.geometry_, scene_nodes());
   }
   Run(const Run&) = delete;
   Run& operator=(const Run&) = delete;
@@ -119,8 +123,9 @@ class PointHistories::Run {
       SurfacePoint place = carried.at(instants_[node]);
       place.tolerance_m = 1e-9;
       instants_[node].hemisphere(place, rays.rays);
-      // A part of a prescribed temperature may be small and hot, so that a single ray would stand
-      // for far more than it is.
+      // Parts of prescribed temperatures are summed by their area.
+      if (parts_.empty()) continue;
+      rays.parts = parts_.seen_from(place, point.entity, rays.other_entities, instants_[node]);
       for (HemisphereRay& ray : rays.rays) {
         const bool entity = ray.hit_surface && ray.hit.entity != kNoEntity;
         if (entity && all_.geometry_.materials[ray.hit.material].prescribed_k) {
@@ -173,8 +178,10 @@ class PointHistories::Run {
       if (dry) return std::nullopt;
       return rain_on_face_frac(instants_.back(), {point.position_world_m, normal, 1e-9});
     };
+    const std::vector<MotionSample> motion = courses_->motion(point);
     solver->second.run(point.normal,
-                       {front, back, rain_frac(point.normal), rain_frac(-point.normal), base},
+                       {front, back, rain_frac(point.normal), rain_frac(-point.normal), base,
+                        motion, courses_->film_body(point)},
                        times_ns, out_k, out_base_j_m2);
   }
 
@@ -228,9 +235,11 @@ class PointHistories::Run {
   }
 
   const PointHistories& all_;
+  PrescribedParts parts_;
   std::vector<std::int64_t> nodes_ns_;
   std::vector<SceneInstant> instants_;
   std::optional<BodyInteriors> bodies_;
+  std::optional<EntityCourses> courses_;
   std::vector<std::vector<ViewSample>> body_views_;  ///< of the points of the bodies
   std::map<std::uint32_t, LayerMesh> meshes_;
   tbb::enumerable_thread_specific<std::map<std::uint32_t, PointSolver>> solvers_;

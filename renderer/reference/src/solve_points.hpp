@@ -26,18 +26,30 @@ struct SightLink {
   std::uint32_t patch = 0;
   double share_frac = 0.0;
 };
-/// Patches in the view of a point from an instant on.
+/// Share of a point's hemisphere that shows parts of entities with a prescribed temperature.
+struct PartLink {
+  std::uint32_t material = 0;
+  double share_frac = 0.0;
+  double emitted_w_m2 = 0.0;  ///< by the parts, per area of their own
+};
+/// Patches and parts in the view of a point from an instant on.
 struct SightEpoch {
   std::int64_t from_ns = 0;
   std::vector<SightLink> links;
+  std::vector<PartLink> parts;
 };
-/// Patches in the view of a point over its history. An epoch lasts until the next one begins.
+/// Patches and parts in the view of a point over its history. An epoch lasts until the next one
+/// begins.
 struct PointSight {
   std::vector<SightEpoch> epochs;  ///< ascending; empty: no patches
 
   /// Returns the links of the last epoch, in which the picture lies.
   [[nodiscard]] std::span<const SightLink> now() const noexcept {
     return epochs.empty() ? std::span<const SightLink>() : epochs.back().links;
+  }
+  /// Returns the parts of the last epoch.
+  [[nodiscard]] std::span<const PartLink> parts_now() const noexcept {
+    return epochs.empty() ? std::span<const PartLink>() : epochs.back().parts;
   }
 };
 
@@ -62,9 +74,10 @@ struct PointSolution {
 /// points were in the past, and with the radiation of what they see: with thermal.exchange, rays
 /// end on patches with histories of their own, and theirs on further patches, which take all that
 /// they see for surroundings of the environment's temperature. While an object moves, what it sees
-/// and what it sends to others count as surroundings. Faces that rest on the interior of their body
-/// follow its temperature (BodyInteriors), which patches take from faces without exchange. Owner:
-/// the caller.
+/// and what it sends to others count as surroundings. Parts of objects with a prescribed
+/// temperature are summed over their area (PrescribedParts); they emit, and reflect nothing. Faces
+/// that rest on the interior of their body follow its temperature (BodyInteriors), which patches
+/// take from faces without exchange. Owner: the caller.
 class PointHistories {
  public:
   /// Prepares histories from the start of the climate's history. Visibility is sampled densely from

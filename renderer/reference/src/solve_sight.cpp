@@ -61,6 +61,7 @@ PointSight SightBuilder::add(const SolvePoint& point, std::span<const EpochRays>
   for (const EpochRays& epoch : epochs) {
     SightEpoch& out = sight.epochs.emplace_back();
     out.from_ns = epoch.from_ns;
+    out.parts = epoch.parts;
     std::map<std::uint32_t, std::uint32_t> hits;
     for (const HemisphereRay& ray : epoch.rays) {
       if (!ray.hit_surface) continue;
@@ -94,8 +95,10 @@ void PatchHistories::add_to(std::span<ViewSample> views, const PointSight& sight
       ++epoch;
     }
     const std::vector<SightLink>& links = sight.epochs[epoch].links;
+    const std::vector<PartLink>& parts = sight.epochs[epoch].parts;
     double share = 0.0;
     for (const SightLink& link : links) share += link.share_frac;
+    for (const PartLink& part : parts) share += part.share_frac;
     if (!(share > 0.0)) continue;
     // Find the instants around the view's, between which patches are linear.
     const auto after = std::upper_bound(nodes_ns_.begin(), nodes_ns_.end(), view.time_ns);
@@ -118,6 +121,7 @@ void PatchHistories::add_to(std::span<ViewSample> views, const PointSight& sight
           link.share_frac * (x.shortwave_w_m2 + part * (y.shortwave_w_m2 - x.shortwave_w_m2));
       longwave += link.share_frac * (x.longwave_w_m2 + part * (y.longwave_w_m2 - x.longwave_w_m2));
     }
+    for (const PartLink& link : parts) longwave += link.share_frac * link.emitted_w_m2;
     const double room = std::clamp(1.0 - view.sky_frac, 0.0, share) / share;
     view.scene_frac = share * room;
     view.scene_shortwave_w_m2 += shortwave * room;

@@ -24,6 +24,7 @@ class SightBuilder {
     std::int64_t from_ns = 0;
     const SceneInstant* instant = nullptr;  ///< of the rays
     std::vector<HemisphereRay> rays;
+    std::vector<PartLink> parts;  ///< stand for the rays that end on such parts
     bool other_entities = true;
     bool scenery = true;
   };

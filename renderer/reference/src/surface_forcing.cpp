@@ -10,6 +10,7 @@
 
 #include "emit/physics/climate/rain.hpp"
 #include "emit/physics/constants.hpp"
+#include "emit/physics/evaporation.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/physics/weather.hpp"
 #include "emit/reference/surface_water.hpp"
@@ -74,12 +75,14 @@ struct Weather {
 };
 
 /// Returns the times of the nodes: all times at which the forcing bends or jumps within the run,
-/// and at most one step apart between them.
+/// and at most one step apart between them, or ten before `fine_from_ns`.
 std::vector<std::int64_t> node_times(const Weather& weather, std::int64_t start_ns,
                                      std::int64_t history_ns, std::int64_t end_ns,
-                                     std::int64_t step_ns) {
+                                     std::int64_t step_ns, std::int64_t fine_from_ns) {
+  constexpr std::int64_t kEarlySteps = 10;
   // Collect the times that must have a node.
-  std::vector<std::int64_t> marks{start_ns, history_ns, end_ns};
+  std::vector<std::int64_t> marks{start_ns, history_ns, std::clamp(fine_from_ns, start_ns, end_ns),
+                                  end_ns};
   for (const physics::WeatherSample& row : weather.rows) {
     if (row.sim_time_ns > start_ns && row.sim_time_ns < end_ns) marks.push_back(row.sim_time_ns);
   }
@@ -88,10 +91,11 @@ std::vector<std::int64_t> node_times(const Weather& weather, std::int64_t start_
   std::vector<std::int64_t> times;
   for (std::size_t i = 0; i + 1 < marks.size(); ++i) {
     const std::int64_t length_ns = marks[i + 1] - marks[i];
-    const std::int64_t parts = std::max<std::int64_t>(1, (length_ns + step_ns - 1) / step_ns);
+    const std::int64_t longest_ns = marks[i] < fine_from_ns ? kEarlySteps * step_ns : step_ns;
+    const std::int64_t parts = std::max<std::int64_t>(1, (length_ns + longest_ns - 1) / longest_ns);
     for (std::int64_t part = 0; part < parts; ++part) {
       // Take whole steps first: with equal lengths the solver meets its matrices again.
-      times.push_back(marks[i] + part * step_ns);
+      times.push_back(marks[i] + part * longest_ns);
     }
   }
   times.push_back(marks.back());
@@ -122,8 +126,8 @@ FaceState face_state(const ClimateNode& climate, const SurfaceOptics& surface,
                           ground_frac * physics::kStefanBoltzmannWPerM2K4 * env2 * env2;
   FaceState out{surface.solar_absorptance_frac * shortwave + surface.emissivity_frac * longwave,
                 0.0, climate.air_k,
-                FaceFilm{physics::air_film(climate.flow), surface.normal, surface.roughness,
-                         surface.both_sides}};
+                FaceFilm{physics::air_film(climate.flow, surface.film_body), surface.normal,
+                         surface.roughness, surface.both_sides}};
   if (!surface.moisture.dry() || surface.holds_water) {
     out.moisture =
         FaceMoisture{.vapour_pa = climate.vapour_pa,
@@ -132,6 +136,16 @@ FaceState face_state(const ClimateNode& climate, const SurfaceOptics& surface,
                      .resistance_s_m = light_resistance_s_m(surface.moisture, shortwave)};
     out.moisture->film_frac = climate.wet_frac;
   }
+  return out;
+}
+
+ClimateNode climate_past(const ClimateNode& open, const MotionSample& motion) noexcept {
+  ClimateNode out = open;
+  out.flow = physics::raised_flow(open.flow, motion.up_m);
+  out.flow.flow_m_s -= motion.velocity_m_s;
+  out.air_k = physics::felt_air_k(out.flow);
+  const double humidity_frac = open.vapour_pa / physics::saturation_over_water_pa(open.flow.air_k);
+  out.vapour_pa = humidity_frac * physics::saturation_over_water_pa(out.flow.air_k);
   return out;
 }
 
@@ -216,9 +230,9 @@ Result<SurfaceClimate> SurfaceClimate::create(const scene::ScenarioDesc& scenari
     node_stated.push_back(stated);
     all_stated = all_stated && stated;
   };
-  for (const std::int64_t time_ns :
-       node_times(weather, start_ns, climate.history_start_ns_, end_ns,
-                  static_cast<std::int64_t>(std::min(step_ns, 9e18)))) {
+  for (const std::int64_t time_ns : node_times(weather, start_ns, climate.history_start_ns_, end_ns,
+                                               static_cast<std::int64_t>(std::min(step_ns, 9e17)),
+                                               options.fine_from_ns.value_or(start_ns))) {
     const auto rows_here = std::count_if(
         weather.rows.begin(), weather.rows.end(),
         [time_ns](const physics::WeatherSample& row) { return row.sim_time_ns == time_ns; });

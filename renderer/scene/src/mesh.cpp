@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "emit/scene/mesh.hpp"
 
+#include <algorithm>
 #include <glm/common.hpp>
 #include <glm/ext/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>
@@ -55,6 +56,23 @@ glm::dmat4 body_from_model(const ObjectDesc& object) noexcept {
   if (angles.y != 0.0) matrix = glm::rotate(matrix, angles.y, glm::dvec3(0.0, 1.0, 0.0));
   if (angles.z != 0.0) matrix = glm::rotate(matrix, angles.z, glm::dvec3(1.0, 0.0, 0.0));
   return glm::scale(matrix, glm::dvec3(object.scale));
+}
+
+physics::AirFilmBody film_body(const ScenarioDesc& scenario, const SceneGeometry& geometry,
+                               std::size_t object) {
+  constexpr double kShortestM = 0.01;
+  physics::AirFilmBody body = scenario.objects[object].air_film;
+  if (body.length_m > 0.0) return body;
+  Aabb box;
+  for (const Instance& instance : geometry.instances) {
+    if (instance.object != object) continue;
+    for (const glm::vec3& p_mesh_m : geometry.meshes[instance.mesh].positions_m) {
+      box.add(glm::dvec3(instance.body_from_mesh * glm::dvec4(p_mesh_m, 1.0)));
+    }
+  }
+  const glm::dvec3 size_m = box.empty() ? glm::dvec3(0.0) : box.max_m - box.min_m;
+  body.length_m = std::max({size_m.x, size_m.y, size_m.z, kShortestM});
+  return body;
 }
 
 glm::dmat4 world_from_body_matrix(const physics::Pose& pose) noexcept {

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "emit/physics/constants.hpp"
 #include "emit/scene/mesh.hpp"
 #include "emit/scene/scene_desc.hpp"
 
@@ -30,6 +32,11 @@ inline void add_box(scene::Mesh& mesh, const glm::dvec3& a, const glm::dvec3& b)
   add_quad(mesh, {{{b.x, b.y, a.z}, {a.x, b.y, a.z}, {a.x, b.y, b.z}, {b.x, b.y, b.z}}});
   add_quad(mesh, {{{a.x, b.y, a.z}, {a.x, a.y, a.z}, {a.x, a.y, b.z}, {a.x, b.y, b.z}}});
   add_quad(mesh, {{{b.x, a.y, a.z}, {b.x, b.y, a.z}, {b.x, b.y, b.z}, {b.x, a.y, b.z}}});
+}
+
+/// Radiation of a black face, W/m2.
+inline double black_w_m2(double kelvin) {
+  return physics::kStefanBoltzmannWPerM2K4 * std::pow(kelvin, 4.0);
 }
 
 struct TestScene {

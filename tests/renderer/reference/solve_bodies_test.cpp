@@ -88,10 +88,6 @@ std::array<double, 2> solved_k(const TestScene& t, std::int64_t now_ns) {
   return {(*points)[0].temperature_k, (*points)[1].temperature_k};
 }
 
-double black_w_m2(double kelvin) {
-  return physics::kStefanBoltzmannWPerM2K4 * std::pow(kelvin, 4.0);
-}
-
 TEST(ReferenceInteriors, CoolDownWithTheirInteriorAsTheHeatBalanceSays) {
   for (const bool entity : {false, true}) {
     for (const scene::BodyInterior& interior :

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
+#include <glm/geometric.hpp>
 #include <limits>
 #include <memory>
 
@@ -41,6 +42,12 @@ ViewSample mix(const ViewSample& a, const ViewSample& b, double f) noexcept {
 /// Interpolates a temperature of the base.
 BaseSample mix(const BaseSample& a, const BaseSample& b, double f) noexcept {
   return {a.time_ns, a.kelvin + f * (b.kelvin - a.kelvin)};
+}
+
+/// Interpolates a motion.
+MotionSample mix(const MotionSample& a, const MotionSample& b, double f) noexcept {
+  return {a.time_ns, a.velocity_m_s + f * (b.velocity_m_s - a.velocity_m_s),
+          a.up_m + f * (b.up_m - a.up_m), glm::normalize(a.normal + f * (b.normal - a.normal))};
 }
 
 /// Moves `row` on to the last row at or before `now_ns`. At a jump this is the later one.
@@ -91,8 +98,6 @@ double PointSolver::seconds(std::int64_t time_ns) const noexcept {
 void PointSolver::advance(const SurfaceOptics& surface, const Views& views,
                           std::int64_t until_ns) noexcept {
   const auto nodes = climate_->nodes();
-  SurfaceOptics behind = surface;
-  behind.normal = -surface.normal;
   // Rain that falls straight down meets a tilted face by its cosine.
   const double front_rain = views.front_rain_frac.value_or(std::max(0.0, surface.normal.z));
   const double back_rain = views.back_rain_frac.value_or(std::max(0.0, -surface.normal.z));
@@ -110,6 +115,11 @@ void PointSolver::advance(const SurfaceOptics& surface, const Views& views,
     if (material_->sheet) {
       seek(views.back, now_ns_, back_row_);
       end_ns = std::min(end_ns, next_time(views.back, now_ns_, back_row_));
+    }
+    // An entity also has the bends of its motion.
+    if (!views.motion.empty()) {
+      seek(views.motion, now_ns_, motion_row_);
+      end_ns = std::min(end_ns, next_time(views.motion, now_ns_, motion_row_));
     }
     // The interior of a body also has the bends of its course.
     if (!views.base.empty()) {
@@ -132,11 +142,18 @@ void PointSolver::advance(const SurfaceOptics& surface, const Views& views,
         climate.wet_frac = value_at(std::array{a, b}, time_ns, 0).wet_frac;
       }
       const double reflectance_frac = climate_->surroundings_reflectance_frac();
+      SurfaceOptics side = surface;
+      if (!views.motion.empty()) {
+        const MotionSample motion = value_at(views.motion, time_ns, motion_row_);
+        climate = climate_past(climate, motion);
+        side.normal = motion.normal;
+      }
       FaceState face =
-          face_state(climate, surface, value_at(views.front, time_ns, view_row_), reflectance_frac);
+          face_state(climate, side, value_at(views.front, time_ns, view_row_), reflectance_frac);
       if (!material_->sheet) return face;
+      side.normal = -side.normal;
       const FaceState other =
-          face_state(climate, behind, value_at(views.back, time_ns, back_row_), reflectance_frac);
+          face_state(climate, side, value_at(views.back, time_ns, back_row_), reflectance_frac);
       face.absorbed_w_m2 = 0.5 * (face.absorbed_w_m2 + other.absorbed_w_m2);
       if (face.moisture) {
         face.moisture->resistance_s_m =
@@ -151,19 +168,24 @@ void PointSolver::advance(const SurfaceOptics& surface, const Views& views,
   }
 }
 
-void PointSolver::spin_up(const SurfaceOptics& surface) {
+void PointSolver::spin_up(const SurfaceOptics& surface, std::span<const MotionSample> rest) {
   // Run from the steady profile with an open view.
   now_ns_ = climate_->start_ns();
   climate_row_ = 0;
   view_row_ = 0;
   back_row_ = 0;
+  motion_row_ = 0;
   solver_.start(start_profile_, 0.0);
   const ViewSample open = open_view(surface.normal);
   const ViewSample open_behind = open_view(-surface.normal);
-  advance(surface, {std::span(&open, 1), std::span(&open_behind, 1)}, climate_->history_start_ns());
+  Views views{std::span(&open, 1), std::span(&open_behind, 1)};
+  views.motion = rest;
+  advance(surface, views, climate_->history_start_ns());
   // Store the profile for further points of this orientation.
   solver_.copy_nodes_k(spin_up_k_);
   spin_up_normal_ = surface.normal;
+  spin_up_up_m_ = rest.empty() ? 0.0 : rest.front().up_m;
+  spin_up_film_body_ = surface.film_body;
   has_spin_up_ = true;
 }
 
@@ -177,15 +199,25 @@ void PointSolver::run(const glm::dvec3& normal, const Views& views,
     std::fill(out_k.begin(), out_k.end(), *material_->prescribed_k);
     return;
   }
-  const SurfaceOptics surface{normal,
+  // An entity stands where it is at the start of the history until then.
+  std::optional<MotionSample> rest;
+  if (!views.motion.empty()) {
+    rest = views.motion.front();
+    rest->velocity_m_s = glm::dvec3(0.0);
+  }
+  const SurfaceOptics surface{rest ? rest->normal : normal,
                               material_->solar_absorptance_frac,
                               material_->emissivity_frac,
                               scene::roughness_factor(material_->roughness),
                               material_->sheet,
                               scene::moisture_of(*material_),
-                              rain_ != nullptr};
-  // Repeat the spin-up only for another orientation.
-  if (!has_spin_up_ || normal != spin_up_normal_) spin_up(surface);
+                              rain_ != nullptr,
+                              views.film_body};
+  // Repeat the spin-up only for another orientation, height or flow.
+  if (!has_spin_up_ || surface.normal != spin_up_normal_ ||
+      (rest ? rest->up_m : 0.0) != spin_up_up_m_ || !(views.film_body == spin_up_film_body_)) {
+    spin_up(surface, rest ? std::span(&*rest, 1) : std::span<const MotionSample>());
+  }
   const std::int64_t start_ns = climate_->history_start_ns();
   solver_.start_nodes(spin_up_k_, seconds(start_ns));
   now_ns_ = start_ns;
@@ -193,12 +225,17 @@ void PointSolver::run(const glm::dvec3& normal, const Views& views,
   view_row_ = 0;
   back_row_ = 0;
   base_row_ = 0;
+  motion_row_ = 0;
   // Replace empty views by open ones.
   const ViewSample open = open_view(normal);
   const ViewSample open_behind = open_view(-normal);
   const Views seen{views.front.empty() ? std::span(&open, 1) : views.front,
                    views.back.empty() ? std::span(&open_behind, 1) : views.back,
-                   views.front_rain_frac, views.back_rain_frac, views.base};
+                   views.front_rain_frac,
+                   views.back_rain_frac,
+                   views.base,
+                   views.motion,
+                   views.film_body};
   // Advance from answer to answer.
   double first_j_m2 = 0.0;
   for (std::size_t i = 0; i < times_ns.size(); ++i) {

@@ -47,6 +47,9 @@ struct ClimateNode {
 struct ClimateOptions {
   std::int64_t end_ns = 0;  ///< last instant asked for; its climate holds from then on
   double step_s = 60.0;     ///< longest stretch over which forcing is linear
+  /// Instant from which step_s counts; before it stretches of up to ten times that, whose errors
+  /// fade until then. Absent: it counts throughout.
+  std::optional<std::int64_t> fine_from_ns = std::nullopt;
   std::optional<std::int64_t> spin_up_ns;  ///< start of the spin-up; thermal.spin_up_ns if absent
   MeshOptions mesh = {};                   ///< mesh of the surroundings
   StepOptions steps = {};
@@ -105,6 +108,15 @@ struct BaseSample {
   double kelvin = 0.0;
 };
 
+/// Motion of a face that goes with an entity, for the air past it. It is linear between samples and
+/// constant outside them; two samples at one time make a jump.
+struct MotionSample {
+  std::int64_t time_ns = 0;
+  glm::dvec3 velocity_m_s{0.0};  ///< world axes
+  double up_m = 0.0;             ///< above the place of the scenario
+  glm::dvec3 normal{0.0, 0.0, 1.0};
+};
+
 /// Orientation and optics of a surface point. `normal` is a unit vector in world axes, z up.
 struct SurfaceOptics {
   glm::dvec3 normal{0.0, 0.0, 1.0};
@@ -113,8 +125,15 @@ struct SurfaceOptics {
   double roughness = 1.0;   ///< factor of the forced part of the film
   bool both_sides = false;  ///< the film is the mean of both faces of a sheet
   physics::MoistSurface moisture = {};
-  bool holds_water = false;  ///< rain wets it
+  bool holds_water = false;             ///< rain wets it
+  physics::AirFilmBody film_body = {};  ///< shape and length of the flow
 };
+
+/// Returns the climate at a face that moves: the wind less its velocity, the air of its height as
+/// the face feels it, and the relative humidity of the ground (physics.md section 8). RT-safe.
+[[nodiscard]] ClimateNode climate_past(const ClimateNode& open,
+                                       const MotionSample& motion) noexcept;
+
 /// Returns the resistance of a moist surface under a short-wave irradiance, s m-1: its inverse goes
 /// linearly from that of the night to that of the day, which counts from 100 W/m2 on.
 [[nodiscard]] double light_resistance_s_m(const physics::MoistSurface& moisture,
@@ -156,6 +175,10 @@ class PointSolver {
     std::optional<double> back_rain_frac = std::nullopt;
     /// Temperature of the base, ascending; empty: that of the material throughout.
     std::span<const BaseSample> base = {};
+    /// Motion of the face, ascending; empty: it stands still at the height of the place.
+    std::span<const MotionSample> motion = {};
+    /// Shape and length of the flow past the face.
+    physics::AirFilmBody film_body = {};
   };
   /// Computes the temperatures at `times_ns`, which ascend. A time before the start of the history
   /// gives the temperature of its start. A prescribed material gives its prescribed temperature.
@@ -170,7 +193,7 @@ class PointSolver {
   [[nodiscard]] const LayerSolver& solver() const noexcept { return solver_; }
 
  private:
-  void spin_up(const SurfaceOptics& surface);
+  void spin_up(const SurfaceOptics& surface, std::span<const MotionSample> rest);
   void advance(const SurfaceOptics& surface, const Views& views, std::int64_t until_ns) noexcept;
   [[nodiscard]] double seconds(std::int64_t time_ns) const noexcept;
 
@@ -183,8 +206,11 @@ class PointSolver {
   std::size_t view_row_ = 0;
   std::size_t back_row_ = 0;
   std::size_t base_row_ = 0;
+  std::size_t motion_row_ = 0;
   bool has_spin_up_ = false;
   glm::dvec3 spin_up_normal_{0.0};
+  double spin_up_up_m_ = 0.0;
+  physics::AirFilmBody spin_up_film_body_;
   std::vector<double> spin_up_k_;  ///< temperature of every node at the start of the history
   std::shared_ptr<const RainCourses> rain_;  ///< null: it never holds water
   std::vector<ProfilePoint> start_profile_;

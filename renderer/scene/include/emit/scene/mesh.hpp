@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
@@ -110,6 +111,11 @@ void update_bounds(Mesh& mesh);
 [[nodiscard]] glm::dmat4 body_from_gltf() noexcept;
 /// Matrix that scales, turns and shifts an object's model (in body axes) into its body.
 [[nodiscard]] glm::dmat4 body_from_model(const ObjectDesc& object) noexcept;
+/// Returns shape and length of an object's flow of air: the user's, or the longest side of the box
+/// around its geometry in body axes, at least 1 cm. `object` is an index into the scenario's
+/// objects. Setup only.
+[[nodiscard]] physics::AirFilmBody film_body(const ScenarioDesc& scenario,
+                                             const SceneGeometry& geometry, std::size_t object);
 /// Matrix of a pose.
 [[nodiscard]] glm::dmat4 world_from_body_matrix(const physics::Pose& pose) noexcept;
 
