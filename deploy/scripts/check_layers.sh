@@ -21,7 +21,8 @@ renderer/embree: renderer/physics
 renderer/reference: renderer/physics renderer/scene
 renderer/reference/src/rays: renderer/embree renderer/reference renderer/physics renderer/scene renderer/threads
 renderer/reference/src/conduction: renderer/reference renderer/reference/src/rays renderer/physics renderer/scene renderer/threads
-renderer/reference/src: renderer/reference renderer/reference/src/rays renderer/reference/src/conduction renderer/physics renderer/scene renderer/threads
+renderer/reference/src/points: renderer/reference renderer/physics renderer/scene renderer/threads
+renderer/reference/src: renderer/reference renderer/reference/src/rays renderer/reference/src/conduction renderer/reference/src/points renderer/physics renderer/scene renderer/threads
 renderer/shaders/shared: renderer/physics
 renderer/gl: renderer/physics renderer/threads
 renderer/include: renderer/physics renderer/scene

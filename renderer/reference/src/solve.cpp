@@ -19,10 +19,10 @@
 #include "emit/reference/visibility.hpp"
 #include "emit/scene/base.hpp"
 #include "emit/threads/parallel.hpp"
+#include "points/point_histories.hpp"
 #include "sky_discs.hpp"
 #include "solve_checkpoint.hpp"
 #include "solve_limits.hpp"
-#include "solve_points.hpp"
 #include "solve_radiance.hpp"
 #include "solve_solid.hpp"
 

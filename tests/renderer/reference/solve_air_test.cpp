@@ -92,9 +92,9 @@ TEST(ReferenceEntityAir, APanelTakesTheRecoveryTemperatureOfItsSpeed) {
   for (const double speed_m_s : {0.0, 150.0, 230.0}) {
     constexpr double kFlownS = 900.0;
     const double far_m = speed_m_s * kFlownS;
-    const TestScene t = panel_scene(
-        {{0, pose_at(0.0), true},
-         {static_cast<std::int64_t>(kFlownS) * kSecondNs, pose_at(far_m), true}});
+    const TestScene t =
+        panel_scene({{0, pose_at(0.0), true},
+                     {static_cast<std::int64_t>(kFlownS) * kSecondNs, pose_at(far_m), true}});
     const double mach = speed_m_s / std::sqrt(1.4 * 287.05 * kHighAirK);
     // Below Mach 0.3 the air is as warm as it is; the panel's own radiation is below 0.1 K.
     const double expected_k = kHighAirK * (1.0 + 0.178 * mach * mach);
@@ -118,8 +118,7 @@ TEST(ReferenceEntityAir, APanelThatStopsGoesBackAsItsFilmLetsIt) {
   physics::AirFlow still;
   still.air_k = kGroundAirK;
   still = physics::raised_flow(still, kUpM);
-  const physics::AirFilm film =
-      physics::air_film(still, {physics::AirFilmShape::plate, kLengthM});
+  const physics::AirFilm film = physics::air_film(still, {physics::AirFilmShape::plate, kLengthM});
   int second = 0;
   for (const int after_s : {30, 300}) {
     for (; second < after_s; ++second) {

@@ -103,7 +103,8 @@ double steady_k(double share_frac) {
   double high = 900.0;
   for (int i = 0; i < 60; ++i) {
     const double k = 0.5 * (low + high);
-    const double in = 0.5 * lit + black_w_m2(kAroundK) - black_w_m2(k) + kSheetFilmW_m2_k * (kAroundK - k);
+    const double in =
+        0.5 * lit + black_w_m2(kAroundK) - black_w_m2(k) + kSheetFilmW_m2_k * (kAroundK - k);
     (in > 0.0 ? low : high) = k;
   }
   return low;
@@ -114,13 +115,14 @@ TEST(ReferenceParts, OfAnySizeHeatByTheirViewFactor) {
     double a_m, b_m, away_m;
   };
   // The share of the last is 8e-6: no ray of 64 would ever meet it.
-  for (const Case& c : {Case{2.0, 3.0, 0.5}, Case{0.5, 0.5, 1.5}, Case{0.1, 0.05, 1.0},
-                        Case{0.1, 0.1, 40.0}}) {
+  for (const Case& c :
+       {Case{2.0, 3.0, 0.5}, Case{0.5, 0.5, 1.5}, Case{0.1, 0.05, 1.0}, Case{0.1, 0.1, 40.0}}) {
     const double share = rectangle_frac(c.a_m, c.b_m, c.away_m);
     const double expected = steady_k(share);
     const double solved = sheet_k(plate_scene(c.a_m, c.b_m, c.away_m), 64);
     // The plate hides sky and surroundings of the sheet's own temperature only by samples of rays.
-    EXPECT_NEAR(solved - kAroundK, expected - kAroundK, 0.01 + 0.01 * (expected - kAroundK)) << share;
+    EXPECT_NEAR(solved - kAroundK, expected - kAroundK, 0.01 + 0.01 * (expected - kAroundK))
+        << share;
   }
 }
 
@@ -134,7 +136,8 @@ TEST(ReferenceParts, AreHiddenByWhatStandsBeforeThem) {
     t.geometry.instances[2].object = 0;
     const double share = edge_m < 0.0 ? 0.0 : 0.5 * rectangle_frac(0.5, 0.5, 1.5);
     const double expected = steady_k(share);
-    EXPECT_NEAR(sheet_k(t, 256) - kAroundK, expected - kAroundK, 0.05 + 0.04 * (expected - kAroundK))
+    EXPECT_NEAR(sheet_k(t, 256) - kAroundK, expected - kAroundK,
+                0.05 + 0.04 * (expected - kAroundK))
         << edge_m;
   }
 }

@@ -7,7 +7,7 @@
 
 #include "emit/reference/surface_forcing.hpp"
 #include "emit/reference/visibility.hpp"
-#include "solve_points.hpp"
+#include "points/point_histories.hpp"
 
 /// Views that points of the one-dimensional solution have of sun, sky and scene over their history.
 namespace emit::reference {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "solve_sight.hpp"
+#include "points/sight.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "solve_views.hpp"
+#include "points/point_views.hpp"
 
 #include <algorithm>
 #include <cmath>

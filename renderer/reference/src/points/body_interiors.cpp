@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "solve_bodies.hpp"
+#include "points/body_interiors.hpp"
 
 #include <algorithm>
 #include <array>

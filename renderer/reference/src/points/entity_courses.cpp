@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "solve_air.hpp"
+#include "points/entity_courses.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,11 +11,11 @@ namespace {
 
 /// Stretches are halved until the velocity of both halves is the same within the first two, or the
 /// stretch is as short as the last.
-constexpr double kEvenFrac = 0.02;
-constexpr double kEvenMPerS = 0.2;
-constexpr std::int64_t kShortestNs = 125'000'000;
+constexpr double kEvenWayFrac = 0.02;
+constexpr double kEvenWayMPerS = 0.2;
+constexpr std::int64_t kShortestWayNs = 125'000'000;
 /// The attitude of both ends of a stretch may differ by 3 degrees (cosine of half the angle).
-constexpr double kEvenAttitude = 0.99966;
+constexpr double kEvenTurn = 0.99966;
 
 /// Returns true if an entity jumps between two instants.
 bool jumps(const RayScene& scene, std::uint32_t entity, std::int64_t from_ns, std::int64_t to_ns) {
@@ -41,8 +41,7 @@ EntityCourses::EntityCourses(const scene::ScenarioDesc& scenario,
   for (std::uint32_t i = 0; i < geometry.instances.size(); ++i) {
     const std::uint32_t entity = nodes.scene.desc().meshes[i].entity;
     if (entity == kNoEntity) continue;
-    courses_[entity].film_body =
-        scene::film_body(scenario, geometry, geometry.instances[i].object);
+    courses_[entity].film_body = scene::film_body(scenario, geometry, geometry.instances[i].object);
   }
   for (std::uint32_t entity = 0; entity < courses_.size(); ++entity) {
     Course& course = courses_[entity];
@@ -60,16 +59,15 @@ void EntityCourses::add_stretch(const RayScene& scene, std::uint32_t entity, std
   const physics::Pose& a = from.entity_pose(entity);
   const physics::Pose& b = to.entity_pose(entity);
   const bool jump = jumps(scene, entity, from_ns, to_ns);
-  const glm::dvec3 whole =
-      jump ? glm::dvec3(0.0) : velocity_m_s(entity, from_ns, from, to_ns, to);
-  if (to_ns - from_ns > kShortestNs) {
+  const glm::dvec3 whole = jump ? glm::dvec3(0.0) : velocity_m_s(entity, from_ns, from, to_ns, to);
+  if (to_ns - from_ns > kShortestWayNs) {
     const std::int64_t middle_ns = from_ns + (to_ns - from_ns) / 2;
     const SceneInstant middle = scene.at(middle_ns);
     const glm::dvec3 half = velocity_m_s(entity, from_ns, from, middle_ns, middle);
     const glm::dvec3 other_half = velocity_m_s(entity, middle_ns, middle, to_ns, to);
     const bool even = glm::distance(half, other_half) <
-                      kEvenMPerS + kEvenFrac * (glm::length(half) + glm::length(other_half));
-    const bool turns = std::abs(glm::dot(a.world_from_body, b.world_from_body)) < kEvenAttitude;
+                      kEvenWayMPerS + kEvenWayFrac * (glm::length(half) + glm::length(other_half));
+    const bool turns = std::abs(glm::dot(a.world_from_body, b.world_from_body)) < kEvenTurn;
     if (!even || turns || jump) {
       add_stretch(scene, entity, from_ns, from, middle_ns, middle, out);
       add_stretch(scene, entity, middle_ns, middle, to_ns, to, out);

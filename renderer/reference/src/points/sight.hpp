@@ -8,7 +8,7 @@
 
 #include "emit/reference/surface_forcing.hpp"
 #include "emit/reference/visibility.hpp"
-#include "solve_points.hpp"
+#include "points/point_histories.hpp"
 
 /// Other surfaces in the view of points of the one-dimensional solution. Rays of a point end on
 /// patches: parts of the scenery with one material that lie close together, seen from there. The

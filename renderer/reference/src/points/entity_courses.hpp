@@ -7,8 +7,8 @@
 
 #include "emit/reference/surface_forcing.hpp"
 #include "emit/scene/mesh.hpp"
-#include "solve_points.hpp"
-#include "solve_views.hpp"
+#include "points/point_histories.hpp"
+#include "points/point_views.hpp"
 
 namespace emit::reference {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "solve_sources.hpp"
+#include "points/prescribed_parts.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -23,7 +23,8 @@ constexpr double kSamePlaceFrac = 1e-6;
 using Corners = std::array<glm::dvec3, 3>;
 
 double longest_side_m(const Corners& c) {
-  return std::max({glm::distance(c[0], c[1]), glm::distance(c[1], c[2]), glm::distance(c[2], c[0])});
+  return std::max(
+      {glm::distance(c[0], c[1]), glm::distance(c[1], c[2]), glm::distance(c[2], c[0])});
 }
 
 /// Returns the share of a point's hemisphere that the visible pieces of a triangle cover.
@@ -83,10 +84,11 @@ PrescribedParts::PrescribedParts(const scene::SceneGeometry& geometry, const Ray
       const std::uint32_t material =
           mesh.materials.empty() ? 0 : mesh.materials[mesh.materials.size() == 1 ? 0 : t];
       if (!geometry.materials[material].prescribed_k) continue;
-      Triangle out{{mesh.positions_m[mesh.indices[3 * t]], mesh.positions_m[mesh.indices[3 * t + 1]],
-                    mesh.positions_m[mesh.indices[3 * t + 2]]},
-                   mesh.entity,
-                   material};
+      Triangle out{
+          {mesh.positions_m[mesh.indices[3 * t]], mesh.positions_m[mesh.indices[3 * t + 1]],
+           mesh.positions_m[mesh.indices[3 * t + 2]]},
+          mesh.entity,
+          material};
       const auto& [a, b, c] = out.corners_m;
       out.area_m2 = 0.5 * glm::length(glm::cross(b - a, c - a));
       if (out.area_m2 > 0.0) triangles_.push_back(out);
@@ -112,8 +114,7 @@ std::vector<PartLink> PrescribedParts::seen_from(const SurfacePoint& point, std:
     const double away_m = glm::length(to_point_m) - longest_side_m(world);
     const double kelvin2 = *material.prescribed_k * *material.prescribed_k;
     const double black_w_m2 = physics::kStefanBoltzmannWPerM2K4 * kelvin2 * kelvin2;
-    if (away_m > 0.0 &&
-        black_w_m2 * part.area_m2 < kLeastW_m2 * physics::kPi * away_m * away_m) {
+    if (away_m > 0.0 && black_w_m2 * part.area_m2 < kLeastW_m2 * physics::kPi * away_m * away_m) {
       continue;
     }
     const double share = visible_share(point, world, kMostCuts, instant);
@@ -123,9 +124,9 @@ std::vector<PartLink> PrescribedParts::seen_from(const SurfacePoint& point, std:
   for (const auto& [index, share] : shares) {
     const scene::Material& material = geometry_.materials[index];
     const double kelvin2 = *material.prescribed_k * *material.prescribed_k;
-    out.push_back({index, share,
-                   material.emissivity_frac * physics::kStefanBoltzmannWPerM2K4 * kelvin2 *
-                       kelvin2});
+    out.push_back(
+        {index, share,
+         material.emissivity_frac * physics::kStefanBoltzmannWPerM2K4 * kelvin2 * kelvin2});
   }
   return out;
 }

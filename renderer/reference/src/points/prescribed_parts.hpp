@@ -7,7 +7,7 @@
 
 #include "emit/reference/visibility.hpp"
 #include "emit/scene/mesh.hpp"
-#include "solve_points.hpp"
+#include "points/point_histories.hpp"
 
 namespace emit::reference {
 

@@ -10,7 +10,7 @@
 
 #include "emit/reference/surface_forcing.hpp"
 #include "emit/reference/visibility.hpp"
-#include "solve_points.hpp"
+#include "points/point_histories.hpp"
 
 namespace emit::reference {
 

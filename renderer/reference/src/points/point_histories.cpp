@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "solve_points.hpp"
+#include "points/point_histories.hpp"
 
 #include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
@@ -15,11 +15,11 @@
 
 #include "emit/reference/surface_water.hpp"
 #include "emit/threads/parallel.hpp"
-#include "solve_air.hpp"
-#include "solve_bodies.hpp"
-#include "solve_sight.hpp"
-#include "solve_sources.hpp"
-#include "solve_views.hpp"
+#include "points/body_interiors.hpp"
+#include "points/entity_courses.hpp"
+#include "points/point_views.hpp"
+#include "points/prescribed_parts.hpp"
+#include "points/sight.hpp"
 
 namespace emit::reference {
 namespace {
