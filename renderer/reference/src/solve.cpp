@@ -94,6 +94,7 @@ struct SceneSolver::Data {
   bool stopped = false;
   double spin_up_s = 0.0;
   PointSolution points;  ///< of the last instant, in one dimension
+  double interior_left_k = 0.0;  ///< most that an interior changed in its last round
   std::string reason;
   std::vector<std::string> notes;
 
@@ -542,12 +543,7 @@ Result<std::vector<double>> SceneSolver::Data::temperatures(std::vector<PixelHit
   });
   if (!solved) return tl::unexpected(std::move(solved.error()));
   points = std::move(*solved);
-  constexpr double kToldK = 0.01;
-  if (points.interior_left_k > kToldK) {
-    notes.push_back(
-        fmt::format("the interiors of bodies still changed by {:.2f} K in the last round",
-                    points.interior_left_k));
-  }
+  interior_left_k = std::max(interior_left_k, points.interior_left_k);
   return points.kelvin;
 }
 
@@ -648,6 +644,11 @@ SolveReport SceneSolver::report() const {
   const Data& d = *data_;
   SolveReport report;
   report.notes = d.notes;
+  constexpr double kToldK = 0.01;
+  if (d.interior_left_k > kToldK) {
+    report.notes.push_back(fmt::format(
+        "the interiors of bodies still changed by {:.2f} K in the last round", d.interior_left_k));
+  }
   report.reason = d.reason;
   report.spin_up_s = d.spin_up_s;
   report.resumed = d.resumed;
