@@ -220,13 +220,12 @@ def gas_tables(rows):
 
 
 def uncertainty_tables(rows):
-    for row in rows:
-        flat = [{"band": row["band"], **{k: i[k] for k in ("input", "range", "source")},
-                 "low": i["low"]["mean_k"], "high": i["high"]["mean_k"],
-                 "rms": max(i["low"]["rms_k"], i["high"]["rms_k"])} for i in row["inputs"] if i["low"]]
+    for band in dict.fromkeys(row["band"] for row in rows):
+        acting = [row for row in rows if row["band"] == band and row["acts"]]
         yield table([("band", field("band")), ("input", field("input")), ("range", field("range")),
-                     ("low end, mean K", field("low")), ("high end, mean K", field("high")), ("RMS, K", field("rms")),
-                     ("source of the range", field("source"))], flat)
+                     ("low end, mean K", field("delta_low_k")), ("high end, mean K", field("delta_high_k")),
+                     ("RMS, K", lambda row: field("rms")({"rms": max(row["rms_low_k"], row["rms_high_k"])})),
+                     ("source of the range", field("source"))], acting)
 
 
 def turn_tables(rows):

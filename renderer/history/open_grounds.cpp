@@ -161,6 +161,11 @@ void OpenGrounds::note_weather(const HistoryInterval& interval, GroundState& sta
       std::min(a.stated_film_frac, b.stated_film_frac) < kAll) {
     state.limits.pass(HeatLimit::strong_wind, interval.begin_ns);
   }
+  const auto dark = [](const physics::Forcing& now) {
+    const double air2 = now.air_k * now.air_k;
+    return now.longwave_down_w_m2 < kLeastSkyFrac * physics::kStefanBoltzmannWPerM2K4 * air2 * air2;
+  };
+  if (dark(a) || dark(b)) state.limits.pass(HeatLimit::longwave_low, interval.begin_ns);
   if (more_moist_ && std::min(a.air_k, b.air_k) < physics::kZeroCelsiusK) {
     state.limits.pass(HeatLimit::freezing, interval.begin_ns);
   }

@@ -285,10 +285,13 @@ TEST_F(ConfigTest, epw_days_go_on_into_other_years_and_over_leap_days) {
   EXPECT_NEAR(row_at(*loaded, -59.0 * 24.0 + 15.0).air_k, 273.15 + 16.2, 1e-9) << "31 December";
 }
 
-TEST_F(ConfigTest, epw_missing_values_are_filled_and_said) {
+/// A year without long-wave irradiance, by either code, and without the air of four hours.
+class EpwGaps : public ConfigTest, public ::testing::WithParamInterface<double> {};
+INSTANTIATE_TEST_SUITE_P(Codes, EpwGaps, ::testing::Values(9999.0, 0.0));
+TEST_P(EpwGaps, are_filled_and_said) {
   auto hours = made_year();
   for (Hour& h : hours) {
-    h.longwave_w_m2 = 9999.0;
+    h.longwave_w_m2 = GetParam();
     if (h.month == 6 && h.day == 21 && h.hour >= 10 && h.hour < 14) h.air_c = 99.9;
   }
   write("w.epw", epw(hours));
@@ -305,7 +308,8 @@ TEST_F(ConfigTest, epw_missing_values_are_filled_and_said) {
   EXPECT_GT(row_at(*loaded, 12.0).longwave_down_w_m2, 250.0);
   EXPECT_LT(row_at(*loaded, 12.0).longwave_down_w_m2, 380.0);
   EXPECT_THAT(loaded->warnings,
-              ElementsAre(HasSubstr("w.epw: 4 missing values of air"),
+              ElementsAre(AllOf(HasSubstr("w.epw: 4 missing values of air"),
+                                HasSubstr("the longest gap over 4 h from line 41")),
                           HasSubstr("w.epw: the long-wave irradiance of 8760 records")));
 }
 

@@ -240,11 +240,12 @@ const KeyTable<Material>& material_keys() {
                            {"medium_rough", Roughness::medium_rough},
                            {"medium_smooth", Roughness::medium_smooth},
                            {"smooth", Roughness::smooth},
-                           {"very_smooth", Roughness::very_smooth}},
+                           {"very_smooth", Roughness::very_smooth},
+                           {"open_water", Roughness::open_water}},
                        EMIT_FIELD(roughness),
                        "foster: roughness for the wind: gravel and crops are very_rough, brick "
                        "rough, concrete medium_rough, fabric medium_smooth, painted metal smooth, "
-                       "glass very_smooth."),
+                       "glass very_smooth, ponds and the sea open_water."),
       written_if([](const Material& in) { return !in.layers.empty(); },
                  choice<Material>(
                      "base",

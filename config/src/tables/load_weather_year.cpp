@@ -35,6 +35,7 @@ struct Field {
   double shift = 0.0;
   double missing_from = 9999.0;
   physics::limits::Interval range;
+  bool zero_is_missing = false;  ///< no sky sends nothing: such files hold 0 for a gap
 };
 
 using physics::kZeroCelsiusK;
@@ -49,7 +50,8 @@ const Field kLongwave{"horizontal infrared",
                       1.0,
                       0.0,
                       9999.0,
-                      physics::limits::kLongwaveDownWM2};
+                      physics::limits::kLongwaveDownWM2,
+                      true};
 const Field kBeam{"direct normal", &YearRecord::direct_normal_w_m2,  1.0, 0.0,
                   9999.0,          physics::limits::kDirectNormalWM2};
 const Field kDiffuse{"diffuse horizontal",
@@ -135,6 +137,7 @@ Result<void> take(const Lines& lines, std::span<const std::string_view> cells, s
   if (!value) return tl::unexpected<Error>(value.error());
   // Negative codes are those of TMY3.
   if (*value >= field.missing_from || *value <= -9900.0) return {};
+  if (field.zero_is_missing && *value == 0.0) return {};
   const double in_unit = *value * field.factor + field.shift;
   if (!field.range.contains(in_unit)) {
     return tl::unexpected(

@@ -38,8 +38,11 @@ struct Interval {
 /// Counts of what the file does not say.
 struct Filled {
   std::size_t values = 0;
+  std::size_t longest = 0;       ///< records in the longest gap of one value
+  std::size_t longest_line = 0;  ///< of the file, where it begins
   std::size_t longwave = 0;
-  std::size_t sun = 0;           ///< averages of sun and sky light, by day
+  std::size_t longwave_guessed = 0;  ///< of these, without dew point or clouds anywhere
+  std::size_t sun = 0;               ///< averages of sun and sky light, by day
   double left_out_w_h_m2 = 0.0;  ///< sun and sky light that the height of the sun does not allow
 };
 
@@ -79,21 +82,29 @@ std::vector<Interval> lay_out(const WeatherYear& year, std::int64_t epoch_utc_ns
 
 /// Replaces missing values of an instant by linear interpolation between those that are there.
 void fill(std::vector<YearRecord>& records, std::optional<double> YearRecord::*member,
-          std::size_t& count) {
+          Filled& filled) {
   std::optional<std::size_t> before;
+  const auto close = [&](std::size_t end) {
+    const std::size_t first = before ? *before + 1 : 0;
+    filled.values += end - first;
+    if (end - first <= filled.longest) return;
+    filled.longest = end - first;
+    filled.longest_line = records[first].line;
+  };
   for (std::size_t i = 0; i < records.size(); ++i) {
     if (!(records[i].*member)) continue;
+    close(i);
     for (std::size_t k = before ? *before + 1 : 0; k < i; ++k) {
       const double share =
           before ? static_cast<double>(k - *before) / static_cast<double>(i - *before) : 1.0;
       const double from = before ? *(records[*before].*member) : *(records[i].*member);
       records[k].*member = from + share * (*(records[i].*member) - from);
-      ++count;
     }
     before = i;
   }
   if (!before) return;
-  for (std::size_t k = *before + 1; k < records.size(); ++k, ++count) {
+  close(records.size());
+  for (std::size_t k = *before + 1; k < records.size(); ++k) {
     records[k].*member = records[*before].*member;
   }
 }
@@ -110,6 +121,7 @@ void fill_longwave(std::vector<YearRecord>& records, const physics::CloudBase& b
         physics::sky_longwave_w_m2(physics::Kelvin(*record.air_k), physics::Kelvin(dew_k),
                                    record.cloud_frac.value_or(0.0), base);
     ++filled.longwave;
+    filled.longwave_guessed += record.dew_point_k && record.cloud_frac ? 0U : 1U;
   }
 }
 
@@ -316,7 +328,7 @@ std::vector<WeatherSample> weather_of_year(const WeatherYear& given, const std::
   Filled filled;
   for (const auto member : {&YearRecord::air_k, &YearRecord::dew_point_k, &YearRecord::wind_m_s,
                             &YearRecord::cloud_frac}) {
-    fill(year.records, member, filled.values);
+    fill(year.records, member, filled);
   }
   fill_longwave(year.records, scenario.clear_sky.cloud_base, filled);
   const std::vector<Interval> intervals = lay_out(year, scenario.epoch_utc_ns);
@@ -341,13 +353,18 @@ std::vector<WeatherSample> weather_of_year(const WeatherYear& given, const std::
   }
   if (filled.values > 0) {
     warnings.push_back(fmt::format(
-        "{}: {} missing values of air, dew point, wind or clouds are linear between others", name,
-        filled.values));
+        "{}: {} missing values of air, dew point, wind or clouds are linear between others, the "
+        "longest gap over {:g} h from line {} on",
+        name, filled.values, static_cast<double>(filled.longest) * year.record_h,
+        filled.longest_line));
   }
   if (filled.longwave > 0) {
     warnings.push_back(fmt::format(
-        "{}: the long-wave irradiance of {} records is made of air, dew point and clouds", name,
-        filled.longwave));
+        "{}: the long-wave irradiance of {} records is made of air, dew point and clouds{}", name,
+        filled.longwave,
+        filled.longwave_guessed == 0
+            ? ""
+            : ", with a dew point 10 K below the air, or without clouds, where the file has none"));
   }
   if (filled.sun > 0) {
     warnings.push_back(

@@ -372,12 +372,11 @@ class Search {
       const double half = quantile * error;
       const PlateNumber which = free_[static_cast<std::size_t>(k)];
       const double value = value_of(numbers, which);
-      if (is_factor(k)) {
-        fit.estimates.push_back(
-            {which, value, value * error, value * std::exp(-half), value * std::exp(half)});
-      } else {
-        fit.estimates.push_back({which, value, error, value - half, value + half});
-      }
+      const PlateRange kept = range_of(which);
+      const double low = is_factor(k) ? value * std::exp(-half) : value - half;
+      const double high = is_factor(k) ? value * std::exp(half) : value + half;
+      fit.estimates.push_back({which, value, is_factor(k) ? value * error : error,
+                               std::max(kept.low, low), std::min(kept.high, high)});
     }
     return {};
   }
@@ -403,6 +402,11 @@ double& value_of(PlateNumbers& numbers, PlateNumber which) noexcept {
       break;
   }
   return numbers.base_k;
+}
+
+PlateRange range_of(PlateNumber which) noexcept {
+  const Range& range = kRanges[static_cast<std::size_t>(which)];
+  return {range.low, range.high};
 }
 
 const char* name_of(PlateNumber which) noexcept {

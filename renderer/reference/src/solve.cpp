@@ -93,7 +93,7 @@ struct SceneSolver::Data {
   bool resumed = false;
   bool stopped = false;
   double spin_up_s = 0.0;
-  PointSolution points;  ///< of the last instant, in one dimension
+  PointSolution points;          ///< of the last instant, in one dimension
   double interior_left_k = 0.0;  ///< most that an interior changed in its last round
   std::string reason;
   std::vector<std::string> notes;

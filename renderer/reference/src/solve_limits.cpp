@@ -19,6 +19,7 @@ namespace {
 
 constexpr double kSnowAirK = 274.15;
 constexpr double kMostWindMS = 20.0;
+constexpr double kLeastSkyFrac = 0.4;
 
 /// Returns the names of materials, quoted.
 std::string names_of(const std::vector<std::string_view>& names) {
@@ -38,8 +39,11 @@ std::vector<std::string> weather_limits(const scene::ScenarioDesc& scenario,
   std::vector<std::string> out;
   double coldest_rain_k = kSnowAirK;
   double wind_m_s = 0.0;
+  const ClimateNode* dark = nullptr;
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     const ClimateNode& node = nodes[i];
+    const double black = physics::kStefanBoltzmannWPerM2K4 * std::pow(node.air_k, 4.0);
+    if (dark == nullptr && node.longwave_down_w_m2 < kLeastSkyFrac * black) dark = &node;
     if (i > 0 && node.rain_mm > nodes[i - 1].rain_mm) {
       coldest_rain_k = std::min({coldest_rain_k, node.air_k, nodes[i - 1].air_k});
     }
@@ -61,6 +65,13 @@ std::vector<std::string> weather_limits(const scene::ScenarioDesc& scenario,
         fmt::format("strong_wind: the wind reaches {:.1f} m/s, beyond the measurements of "
                     "the air film",
                     wind_m_s));
+  }
+  if (dark != nullptr) {
+    out.push_back(fmt::format(
+        "longwave_low: the weather's long-wave irradiance is {:.0f} W/m2 at {} s, below {} of a "
+        "black sky's at {:.1f} K: a gap in it?",
+        dark->longwave_down_w_m2, static_cast<double>(dark->time_ns) * 1e-9, kLeastSkyFrac,
+        dark->air_k));
   }
   std::vector<std::string_view> moist;
   for (const scene::Material& material : geometry.materials) {

@@ -337,11 +337,26 @@ Tornado tornado_of(const UncertaintyOptions& options, double time_s, const BandE
   return tornado;
 }
 
-Json shift_json(const Shift& shift) {
+/// One input in one band. `low` and `high` name the ends of its range, and `delta_low_k` and
+/// `delta_high_k` are the mean shifts of the surfaces there; an input without effect shifts
+/// nothing.
+Json effect_json(const BandEffects& band, const Effect& effect) {
+  const Input& input = *effect.input;
   return Json::object()
-      .set("mean_k", shift.mean_k)
-      .set("rms_k", shift.rms_k)
-      .set("p99_k", shift.p99_k);
+      .set("band", band.band)
+      .set("input", input.name)
+      .set("range", input.range)
+      .set("source", input.source)
+      .set("acts", effect.acts())
+      .set("low", fmt::format("low end: {}", input.range))
+      .set("high", fmt::format("high end: {}", input.range))
+      .set("delta_low_k", effect.low.mean_k)
+      .set("delta_high_k", effect.high.mean_k)
+      .set("rms_low_k", effect.low.rms_k)
+      .set("rms_high_k", effect.high.rms_k)
+      .set("p99_low_k", effect.low.p99_k)
+      .set("p99_high_k", effect.high.p99_k)
+      .set("all_inputs_rms_k", band.all_k());
 }
 
 int run(const UncertaintyOptions& options) {
@@ -356,34 +371,18 @@ int run(const UncertaintyOptions& options) {
   std::vector<Tornado> plots;
   for (const BandEffects& band : *bands) {
     TextTable table({"input", "range", "mean low K", "mean high K", "rms K", "p99 K"});
-    Json inputs = Json::array();
     for (const Effect& effect : band.effects) {
+      results.push(effect_json(band, effect));
       if (!effect.acts()) {
         table.add({effect.input->name, effect.input->range, "no effect", "", "", ""});
-        inputs.push(Json::object()
-                        .set("input", effect.input->name)
-                        .set("range", effect.input->range)
-                        .set("source", effect.input->source)
-                        .set("low", nullptr)
-                        .set("high", nullptr));
         continue;
       }
       table.add({effect.input->name, effect.input->range, fmt::format("{:+.2f}", effect.low.mean_k),
                  fmt::format("{:+.2f}", effect.high.mean_k), fmt::format("{:.2f}", effect.rms_k()),
                  fmt::format("{:.2f}", std::max(effect.low.p99_k, effect.high.p99_k))});
-      inputs.push(Json::object()
-                      .set("input", effect.input->name)
-                      .set("range", effect.input->range)
-                      .set("source", effect.input->source)
-                      .set("low", shift_json(effect.low))
-                      .set("high", shift_json(effect.high)));
     }
     fmt::print(text, "\nband {}, all inputs in squares {:.2f} K RMS\n{}", band.band, band.all_k(),
                table.to_string());
-    results.push(Json::object()
-                     .set("band", band.band)
-                     .set("all_rms_k", band.all_k())
-                     .set("inputs", std::move(inputs)));
     plots.push_back(tornado_of(options, time_s, band));
   }
   if (options.plot) {

@@ -63,8 +63,19 @@ Json numbers_json(const reference::PlateNumbers& numbers) {
       .set("base_k", numbers.base_k);
 }
 
-Json case_json(const NatureCase& result, double bar_k, bool is_fitted) {
-  Json out = json_of(result.difference);
+/// Beginning of a result: one case of a day. The keys `site`, `fitted`, `rms_k`, `bias_k`, `max_k`
+/// and `hours` are the contract of the suite.
+Json begin_case(const NatureDay& day, const char* name, Json fitted, const Difference& difference) {
+  const LoggerRecord& record = day.record;
+  Json out = Json::object();
+  out.set("site", record.file.stem().string()).set("day", record.file.filename().string());
+  out.set("case", name).set("fitted", std::move(fitted));
+  out.set("hours", (record.rows.back().time_s - record.rows.front().time_s) / 3600.0);
+  add_difference(out, difference);
+  return out;
+}
+
+Json case_json(Json out, const NatureCase& result, double bar_k, bool is_fitted) {
   out.set("bar_rms_k", bar_k).set("within_bar", result.difference.rms_k <= bar_k);
   out.set("measured_in_band_frac", result.within_frac);
   out.set("numbers", numbers_json(result.numbers));
@@ -82,10 +93,10 @@ Json case_json(const NatureCase& result, double bar_k, bool is_fitted) {
   return out.set("inputs", std::move(effects));
 }
 
-Json day_json(const NatureDay& day) {
-  Json out = Json::object();
-  out.set("day", day.record.file.filename().string()).set("rows", day.record.rows.size());
-  out.set("material", day.ground.material.name);
+/// Adds the cases of a day to the results. What belongs to the day stands in its first case.
+void add_day(const NatureDay& day, Json& results) {
+  Json out = begin_case(day, "nothing_fitted", Json::array(), day.library.difference);
+  out.set("rows", day.record.rows.size()).set("material", day.ground.material.name);
   Json signs = Json::array();
   for (const GroundSign& sign : day.signs) {
     signs.push(Json::object()
@@ -93,7 +104,9 @@ Json day_json(const NatureDay& day) {
                    .set("text", sign.text)
                    .set("breaks_model", sign.breaks_model));
   }
-  const bool holds = std::ranges::none_of(day.signs, &GroundSign::breaks_model);
+  // A fit that went wrong says nothing about the layers of the library.
+  const bool holds = std::ranges::none_of(
+      day.signs, [](const GroundSign& sign) { return sign.breaks_model && sign.kind != "fit"; });
   out.set("dry_layers_hold", holds).set("signs", std::move(signs));
   Json origins = Json::array();
   for (const std::string& origin : day.ground.origins) origins.push(origin);
@@ -106,20 +119,21 @@ Json day_json(const NatureDay& day) {
                           .set("to_air_w_m2", day.heat.to_air_w_m2)
                           .set("to_ground_w_m2", day.heat.to_ground_w_m2)
                           .set("missing_w_m2", day.heat.missing_w_m2));
-  out.set("nothing_fitted", case_json(day.library, kLibraryBarK, false));
-  out.set("nothing_fitted_real_time", json_of(day.real_time));
-  Json fitted = case_json(day.fitted, kFittedBarK, true);
+  results.push(case_json(std::move(out), day.library, kLibraryBarK, false));
+  results.push(begin_case(day, "nothing_fitted_real_time", Json::array(), day.real_time));
+  Json names = Json::array();
   Json estimates = Json::array();
   for (const reference::PlateEstimate& estimate : day.fit.estimates) {
+    names.push(reference::name_of(estimate.number));
     estimates.push(Json::object()
                        .set("number", reference::name_of(estimate.number))
                        .set("value", estimate.value)
                        .set("low", estimate.low)
                        .set("high", estimate.high));
   }
+  Json fitted = begin_case(day, "two_fitted", std::move(names), day.fitted.difference);
   fitted.set("estimates", std::move(estimates));
-  out.set("two_fitted", std::move(fitted));
-  return out;
+  results.push(case_json(std::move(fitted), day.fitted, kFittedBarK, true));
 }
 
 void print_day(std::FILE* out, const NatureDay& day) {
@@ -215,7 +229,7 @@ int run(const NatureOptions& options) {
   std::vector<Plot> plots;
   for (const NatureDay& day : days) {
     print_day(text, day);
-    results.push(day_json(day));
+    add_day(day, results);
     plots.push_back(day_plot(day, day.library, "nothing fitted"));
     plots.push_back(day_plot(day, day.fitted, "two numbers fitted"));
   }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 
 #include "emit/physics/air_film.hpp"
@@ -312,6 +313,7 @@ Result<NatureDay> study_day(const std::filesystem::path& file, const LoggerOptio
   if (!heat) return named(heat.error());
   day.heat = *heat;
   day.signs = ground_signs(day.record, day.ground, day.heat);
+  std::ranges::move(fit_signs(day.record, day.ground, day.fit), std::back_inserter(day.signs));
   return day;
 }
 

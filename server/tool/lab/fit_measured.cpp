@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 
 #include "emit/config/load.hpp"
 #include "emit/reference/measured_plate.hpp"
@@ -67,6 +68,7 @@ Result<Outcome> find_outcome(const MeasuredFitOptions& options) {
   if (!heat) return named(heat.error());
   out.heat = *heat;
   out.signs = ground_signs(out.record, out.ground, out.heat);
+  std::ranges::move(fit_signs(out.record, out.ground, out.fit), std::back_inserter(out.signs));
   return out;
 }
 
@@ -95,8 +97,12 @@ Json outcome_json(const Outcome& found) {
   Json out = Json::object();
   out.set("logger", found.record.file.string()).set("material", found.ground.material.name);
   out.set("rows", found.record.rows.size());
-  out.set("before", json_of(difference_of(found.record, found.before_k)));
-  out.set("after", json_of(difference_of(found.record, found.fit.model_k)));
+  for (const auto& [name, model_k] :
+       {std::pair{"before", &found.before_k}, std::pair{"after", &found.fit.model_k}}) {
+    Json json = Json::object();
+    add_difference(json, difference_of(found.record, *model_k));
+    out.set(name, std::move(json));
+  }
   out.set("converged", found.fit.converged).set("iterations", std::uint64_t{found.fit.iterations});
   out.set("independent_rows", found.fit.independent_rows);
   out.set("confidence", "99 %, of all numbers together");

@@ -71,9 +71,11 @@ double hours_of(const std::vector<LoggerRow>& rows, const auto& holds) {
 
 void add_signs_of_words(const LoggerRecord& record, const MeasuredGround& ground,
                         std::vector<GroundSign>& signs) {
-  const std::string_view plant =
-      stated_word(record.words, {"grass", "lawn", "pasture", "meadow", "crop", "crops", "canopy",
-                                 "forest", "corn", "soybeans", "wheat", "vegetation"});
+  const std::string_view plant = stated_word(
+      record.words, {"grass",     "lawn",    "pasture", "meadow",    "crop",     "crops",
+                     "canopy",    "forest",  "corn",    "soybeans",  "wheat",    "vegetation",
+                     "grassland", "prairie", "savanna", "shrubland", "cropland", "alfalfa",
+                     "clover",    "hay",     "heath",   "moss",      "weeds"});
   const bool evaporates = !ground.setup.moisture.dry() || ground.measured_evaporation;
   if (!plant.empty() && ground.measured_evaporation) {
     signs.push_back({"vegetation",
@@ -94,8 +96,9 @@ void add_signs_of_words(const LoggerRecord& record, const MeasuredGround& ground
                                  "not layers of soil",
                                  plant)});
   }
-  const std::string_view wet =
-      stated_word(record.words, {"moist", "wet", "irrigated", "rain", "flooded", "marsh", "swamp"});
+  const std::string_view wet = stated_word(
+      record.words, {"moist", "wet", "irrigated", "rain", "rainy", "flooded", "marsh", "swamp",
+                     "wetland", "bog", "fen", "peat", "damp", "saturated", "waterlogged", "paddy"});
   if (!wet.empty()) {
     signs.push_back(
         {"wet",
@@ -107,7 +110,9 @@ void add_signs_of_words(const LoggerRecord& record, const MeasuredGround& ground
                            wet),
          !evaporates});
   }
-  const std::string_view snow = stated_word(record.words, {"snow", "snowy", "ice", "glacier"});
+  const std::string_view snow = stated_word(
+      record.words,
+      {"snow", "snowy", "snowing", "snowfall", "snowpack", "ice", "icy", "frost", "glacier"});
   if (!snow.empty()) {
     signs.push_back({"snow", fmt::format("the file speaks of '{}': snow melts and lets sun in, "
                                          "which dry layers do not",
@@ -124,6 +129,25 @@ void add_signs_of_words(const LoggerRecord& record, const MeasuredGround& ground
   if (ground.material.dry_layers_valid) return;
   signs.push_back(
       {"material", fmt::format("material '{}' is not valid as dry layers", ground.material.name)});
+}
+
+/// Names a sun that does not stand where time, place and date have it.
+void add_signs_of_sun(const LoggerRecord& record, std::vector<GroundSign>& signs) {
+  constexpr const char* kCause =
+      "its time is not UTC, or place or date are not those of the record";
+  constexpr double kMostDarkFrac = 0.02;
+  if (record.dark_sun_frac && *record.dark_sun_frac > kMostDarkFrac) {
+    signs.push_back(
+        {"sun", fmt::format("{:.0f} % of the sun came while it stood below the horizon: {}",
+                            100.0 * *record.dark_sun_frac, kCause)});
+  }
+  // Good stations close within 5 %, most of it at low sun.
+  constexpr double kMostOpenFrac = 0.15;
+  if (record.sun_gap_frac && *record.sun_gap_frac > kMostOpenFrac) {
+    signs.push_back({"sun", fmt::format("direct and diffuse sun add up to something that differs "
+                                        "from the global sun by {:.0f} % on average: {}",
+                                        100.0 * *record.sun_gap_frac, kCause)});
+  }
 }
 
 void add_signs_of_moisture(const LoggerRecord& record, const MeasuredGround& ground,
@@ -215,10 +239,52 @@ physics::Result<DayHeat> day_heat(const LoggerRecord& record, const MeasuredGrou
   return out;
 }
 
+std::vector<GroundSign> fit_signs(const LoggerRecord& record, const MeasuredGround& ground,
+                                  const reference::PlateFit& fit) {
+  std::vector<GroundSign> signs;
+  double mean_k = 0.0;
+  for (const LoggerRow& row : record.rows) mean_k += row.surface_k;
+  mean_k /= static_cast<double>(record.rows.size());
+  constexpr double kFarBaseK = 25.0;
+  constexpr double kFarAbsorptance = 0.15;
+  for (const reference::PlateEstimate& estimate : fit.estimates) {
+    const char* const name = reference::name_of(estimate.number);
+    const reference::PlateRange range = reference::range_of(estimate.number);
+    const double margin = 1e-3 * (range.high - range.low);
+    if (estimate.value < range.low + margin || estimate.value > range.high - margin) {
+      signs.push_back({"fit", fmt::format("{} stopped at {:.4g}, the end of its range: the record "
+                                          "asks for something else than these numbers",
+                                          name, estimate.value)});
+    } else if (estimate.number == reference::PlateNumber::base &&
+               std::abs(estimate.value - mean_k) > kFarBaseK) {
+      signs.push_back({"fit", fmt::format("{} is {:.0f} K from the mean of the surface: it makes "
+                                          "up for something else",
+                                          name, std::abs(estimate.value - mean_k))});
+    } else if (estimate.number == reference::PlateNumber::absorptance &&
+               ground.absorptance_measured && record.reflected_frac &&
+               std::abs(estimate.value - 1.0 + *record.reflected_frac) > kFarAbsorptance) {
+      signs.push_back({"fit", fmt::format("{} {:.2f} is fitted, but the reflected sun says {:.2f}",
+                                          name, estimate.value, 1.0 - *record.reflected_frac)});
+    }
+  }
+  // Below this the correlation of the residuals is itself hardly known, and intervals that should
+  // hold in 99 of 100 records held in about 90.
+  constexpr double kFewRows = 12.0;
+  if (!fit.estimates.empty() && fit.independent_rows < kFewRows) {
+    signs.push_back({"fit",
+                     fmt::format("residuals change slowly, so that the record counts as {:.0f} "
+                                 "independent rows: the intervals may be too narrow",
+                                 fit.independent_rows),
+                     false});
+  }
+  return signs;
+}
+
 std::vector<GroundSign> ground_signs(const LoggerRecord& record, const MeasuredGround& ground,
                                      const DayHeat& heat) {
   std::vector<GroundSign> signs;
   add_signs_of_words(record, ground, signs);
+  add_signs_of_sun(record, signs);
   constexpr double kSnowAlbedo = 0.4;
   if (record.reflected_frac && *record.reflected_frac > kSnowAlbedo) {
     signs.push_back({"snow", fmt::format("the ground reflects {:.2f} of the sun: snow, ice or salt",

@@ -11,7 +11,7 @@
 namespace emit::tool {
 
 struct GroundSign {
-  std::string kind;  ///< "evaporation", "vegetation", "snow", "freezing", "dew", "wet", "calm"
+  std::string kind;  ///< "evaporation", "vegetation", "snow", "sun", "fit" and others
   std::string text;
   bool breaks_model = true;  ///< false: dry layers still hold, with less certainty
 };
@@ -34,5 +34,11 @@ struct DayHeat {
 [[nodiscard]] std::vector<GroundSign> ground_signs(const LoggerRecord& record,
                                                    const MeasuredGround& ground,
                                                    const DayHeat& heat);
+
+/// Returns what a fit says against its own numbers: one at the end of its range, far from what the
+/// record measured, or known from too few independent rows.
+[[nodiscard]] std::vector<GroundSign> fit_signs(const LoggerRecord& record,
+                                                const MeasuredGround& ground,
+                                                const reference::PlateFit& fit);
 
 }  // namespace emit::tool

@@ -257,6 +257,10 @@ double sun_sine(const LoggerRecord& record, double time_s) {
 struct Sums {
   double incident = 0.0;
   double reflected = 0.0;
+  double sun = 0.0;         // where its place in the sky is known
+  double dark_sun = 0.0;    // of that, below the horizon
+  double global_sun = 0.0;  // where direct, diffuse and global are known
+  double sun_gap = 0.0;
   std::size_t beam_rows = 0;
   std::size_t global_rows = 0;
   std::size_t left_out = 0;
@@ -283,6 +287,8 @@ void add_notes(const Sums& sums, LoggerRecord& record) {
   if (sums.reflected > 0.0 && sums.incident > 0.0) {
     record.reflected_frac = sums.reflected / sums.incident;
   }
+  if (sums.sun > 0.0) record.dark_sun_frac = sums.dark_sun / sums.sun;
+  if (sums.global_sun > 0.0) record.sun_gap_frac = sums.sun_gap / sums.global_sun;
   constexpr double kGapS = 1800.0;
   for (std::size_t i = 1; i < record.rows.size(); ++i) {
     const double pause_s = record.rows[i].time_s - record.rows[i - 1].time_s;
@@ -339,9 +345,8 @@ Result<LoggerRecord> read_logger(const std::filesystem::path& file, const Logger
     }
     const auto at = [&](Quantity q) { return values[static_cast<std::size_t>(q)]; };
     const double time_s = at(Quantity::time);
-    const double beam_sun = has_beam && has_origin && !std::isnan(time_s)
-                                ? at(Quantity::dni) * sun_sine(record, time_s) + at(Quantity::dhi)
-                                : kMissing;
+    const double sine = has_origin && !std::isnan(time_s) ? sun_sine(record, time_s) : kMissing;
+    const double beam_sun = has_beam ? at(Quantity::dni) * sine + at(Quantity::dhi) : kMissing;
     const double sun = std::isnan(beam_sun) ? at(Quantity::ghi) : beam_sun;
     if (!is_whole || std::isnan(sun)) {
       if (sums.left_out++ == 0) sums.first_left_out = reader->line();
@@ -351,6 +356,18 @@ Result<LoggerRecord> read_logger(const std::filesystem::path& file, const Logger
       return make_error(ErrorCode::parse,
                         fmt::format("{}:{}: time {} s does not come after {} s", file.string(),
                                     reader->line(), time_s, record.rows.back().time_s));
+    }
+    if (!std::isnan(sine)) {
+      // Direct sun counts across its beam, so that its share does not vanish with the sine.
+      const double any_sun = std::max(
+          {0.0, sun,
+           has_beam && !std::isnan(beam_sun) ? at(Quantity::dni) + at(Quantity::dhi) : 0.0});
+      sums.sun += any_sun;
+      if (sine <= 0.0) sums.dark_sun += any_sun;
+    }
+    if (const double global = at(Quantity::ghi); !std::isnan(beam_sun) && !std::isnan(global)) {
+      sums.global_sun += std::max(0.0, global);
+      sums.sun_gap += std::abs(beam_sun - global);
     }
     ++(std::isnan(beam_sun) ? sums.global_rows : sums.beam_rows);
     if (sun < 0.0) {

@@ -52,6 +52,11 @@ struct LoggerRecord {
   std::vector<double> rh_frac;           ///< by row, NaN where missing; empty: no such column
   std::vector<double> latent_w_m2;       ///< likewise
   std::optional<double> reflected_frac;  ///< reflected over incident sun, by sums over the record
+  /// Share of the sun that came while it stood below the horizon, if place and date are known.
+  std::optional<double> dark_sun_frac;
+  /// Mean size of the difference between global sun and what direct and diffuse add up to, by mean
+  /// global sun, over the rows that have all three.
+  std::optional<double> sun_gap_frac;
   std::optional<double> lat_deg;
   std::optional<double> lon_deg;
   std::optional<double> height_m;

@@ -80,11 +80,10 @@ Difference difference_of(const LoggerRecord& record, const std::vector<double>& 
   return out;
 }
 
-Json json_of(const Difference& difference) {
+void add_difference(Json& json, const Difference& difference) {
   Json hours = Json::array();
   for (const double max_k : difference.max_by_hour_k) hours.push(max_k);
-  return Json::object()
-      .set("rms_k", difference.rms_k)
+  json.set("rms_k", difference.rms_k)
       .set("bias_k", difference.bias_k)
       .set("max_k", difference.max_k)
       .set("max_by_hour_k", std::move(hours));

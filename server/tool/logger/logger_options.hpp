@@ -30,6 +30,6 @@ struct Difference {
 /// @pre model_k has a value for every row
 [[nodiscard]] Difference difference_of(const LoggerRecord& record,
                                        const std::vector<double>& model_k);
-[[nodiscard]] Json json_of(const Difference& difference);
+void add_difference(Json& json, const Difference& difference);
 
 }  // namespace emit::tool

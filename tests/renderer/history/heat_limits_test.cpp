@@ -101,6 +101,14 @@ TEST(HeatLimits, EachIsNamedWhereItIsPassedAndNowhereElse) {
       for (scene::WeatherSample& row : s.weather) row.wind_m_s = wind_m_s;
     };
   };
+  const auto sky = [](double black_frac) -> Change {
+    return [black_frac](scene::ScenarioDesc& s) {
+      for (scene::WeatherSample& row : s.weather) {
+        row.longwave_down_w_m2 =
+            black_frac * physics::kStefanBoltzmannWPerM2K4 * std::pow(row.air_k, 4.0);
+      }
+    };
+  };
   const Change film = [](scene::ScenarioDesc& s) {
     for (scene::WeatherSample& row : s.weather) row.film_w_m2_k = 30.0;
   };
@@ -129,6 +137,9 @@ TEST(HeatLimits, EachIsNamedWhereItIsPassedAndNowhereElse) {
       {285.0, {wind(19.0)}, ""},
       {285.0, {wind(21.0)}, "strong_wind "},
       {285.0, {wind(21.0), film}, ""},
+      {285.0, {sky(0.45)}, ""},
+      {285.0, {sky(0.35)}, "longwave_low "},
+      {285.0, {sky(0.0)}, "longwave_low "},
   };
   for (std::size_t i = 0; i < std::size(cases); ++i) {
     scene::ScenarioDesc s = even_weather(cases[i].air_k);

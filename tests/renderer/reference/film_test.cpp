@@ -110,4 +110,21 @@ TEST(Film, OfACalmNightIsNotThatOfTheWind) {
   EXPECT_GT(off_k[1], -4.0);
 }
 
+// Judges the film of open water by the bulk coefficients that were measured at sea: 1.1e-3
+// to 1.2e-3 in air of its temperature (Large and Pond 1982; Fairall et al. 2003).
+TEST(Film, OfOpenWaterIsThatOfTheBulkFormula) {
+  const double roughness = scene::roughness_factor(scene::Roughness::open_water);
+  for (const double wind_m_s : {4.0, 6.0, 9.0, 13.0, 18.0}) {
+    physics::AirFlow flow;
+    flow.air_k = 288.0;
+    flow.flow_m_s = {wind_m_s, 0.0, 0.0};
+    const physics::AirProperties air = physics::air_properties(flow.air_k, flow.pressure_pa);
+    const double film_w_m2_k =
+        physics::film_w_m2_k(physics::air_film(flow), glm::dvec3(0.0, 0.0, 1.0), roughness, 0.1);
+    const double coefficient = film_w_m2_k / (air.density_kg_m3 * 1005.0 * wind_m_s);
+    EXPECT_GT(coefficient, 1.0e-3) << wind_m_s;
+    EXPECT_LT(coefficient, 1.35e-3) << wind_m_s;
+  }
+}
+
 }  // namespace

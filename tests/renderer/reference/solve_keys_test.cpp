@@ -238,7 +238,7 @@ TEST(ReferenceKeys, ProbeOfNothingIsNotANumber) {
 
 TEST(ReferenceKeys, NotesNameTheLimitsThatWeatherAndTemperaturesPass) {
   const auto notes_of = [](double air_k, double rain_mm_h, double wind_m_s, bool humidity,
-                           const char* family) {
+                           const char* family, double sky_frac = 1.0) {
     TestScene t = wall_scene();
     scene::Material& ground = t.geometry.materials[0];
     if (*family == '\0') ground.water_store_mm = 0.5;
@@ -248,7 +248,7 @@ TEST(ReferenceKeys, NotesNameTheLimitsThatWeatherAndTemperaturesPass) {
     for (const std::int64_t hour : {-400, 0, 1, 10}) {
       scene::WeatherSample row;
       row.sim_time_ns = hour * kEndNs;
-      row.longwave_down_w_m2 = physics::kStefanBoltzmannWPerM2K4 * std::pow(air_k, 4.0);
+      row.longwave_down_w_m2 = sky_frac * black_w_m2(air_k);
       row.air_k = air_k;
       row.wind_m_s = wind_m_s;
       if (humidity) row.relative_humidity_frac = 0.9;
@@ -273,6 +273,8 @@ TEST(ReferenceKeys, NotesNameTheLimitsThatWeatherAndTemperaturesPass) {
   };
   EXPECT_EQ(notes_of(285.0, 0.0, 3.0, true, ""), "");
   EXPECT_EQ(notes_of(285.0, 0.0, 3.0, false, ""), "");
+  EXPECT_EQ(notes_of(285.0, 0.0, 3.0, true, "", 0.45), "");
+  EXPECT_EQ(notes_of(285.0, 0.0, 3.0, true, "", 0.0), "longwave_low ");
   EXPECT_EQ(notes_of(285.0, 2.0, 3.0, true, ""), "rain_unknown ");  // the top of the wall
   EXPECT_EQ(notes_of(265.0, 2.0, 25.0, false, ""),
             "snowfall strong_wind humidity_unknown rain_unknown freezing ");

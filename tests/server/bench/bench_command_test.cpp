@@ -131,19 +131,20 @@ TEST(CliBench, UncertaintyMovesEveryInputBothWays) {
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const std::string json = read_text(folder.file("u.json"));
   EXPECT_EQ(json_value(json, "suite"), "\"uncertainty\"");
-  const std::vector<double> all_k = numbers_of(json, "all_rms_k");
+  const std::vector<double> all_k = numbers_of(json, "all_inputs_rms_k");
   ASSERT_FALSE(all_k.empty());
   for (const double k : all_k) {
     EXPECT_GT(k, 1.0);
     EXPECT_LT(k, 20.0);
   }
-  // Nearly every input moves the mean, and its ends move it opposite ways.
-  const std::vector<double> means_k = numbers_of(json, "mean_k");
+  // Nearly every one of the twelve inputs moves the mean, and its ends move it opposite ways.
+  const std::vector<double> low_k = numbers_of(json, "delta_low_k");
+  const std::vector<double> high_k = numbers_of(json, "delta_high_k");
+  ASSERT_EQ(low_k.size(), all_k.size());
+  ASSERT_EQ(high_k.size(), all_k.size());
   std::size_t opposite = 0;
-  for (std::size_t i = 0; i + 1 < means_k.size(); i += 2) {
-    opposite += means_k[i] * means_k[i + 1] < 0.0 ? 1U : 0U;
-  }
-  EXPECT_GE(opposite, 9 * all_k.size()) << json;
+  for (std::size_t i = 0; i < low_k.size(); ++i) opposite += low_k[i] * high_k[i] < 0.0 ? 1U : 0U;
+  EXPECT_GE(12 * opposite, 9 * all_k.size()) << json;
   EXPECT_NE(read_text(folder.file("u.svg")).find("film of the air"), std::string::npos);
 }
 

@@ -22,8 +22,9 @@ enum class HeatLimit : std::uint8_t {
   melting,           ///< snow or ice above 0 C
   humidity_unknown,  ///< moist ground in weather that does not state the humidity
   strong_wind,       ///< wind beyond the measurements of the film
+  longwave_low,      ///< less long-wave irradiance than any sky sends: a gap in the weather
 };
-inline constexpr std::size_t kHeatLimits = 7;
+inline constexpr std::size_t kHeatLimits = 8;
 /// Limits that were passed, by number.
 using HeatLimits = std::bitset<kHeatLimits>;
 
@@ -37,8 +38,8 @@ inline void add(HeatLimits& limits, HeatLimit which) noexcept {
 /// Returns the name of a limit in outputs, such as "freezing".
 [[nodiscard]] constexpr std::string_view name_of(HeatLimit which) noexcept {
   constexpr std::array<std::string_view, kHeatLimits> kNames{
-      "rain_unknown", "rain_shelter",     "snowfall",   "freezing",
-      "melting",      "humidity_unknown", "strong_wind"};
+      "rain_unknown", "rain_shelter",     "snowfall",    "freezing",
+      "melting",      "humidity_unknown", "strong_wind", "longwave_low"};
   return kNames[static_cast<std::size_t>(which)];
 }
 /// Returns a sentence about a limit, without a full stop, of at most 85 bytes.
@@ -50,7 +51,8 @@ inline void add(HeatLimits& limits, HeatLimit which) noexcept {
       "moist ground is below 0 C: freezing takes no heat here, ice sublimates as water does",
       "snow or ice is above 0 C: melting takes no heat here, so that it is too warm",
       "the weather lacks the humidity that moist ground needs: 60 % at the mean air counts",
-      "the wind is above 20 m/s, beyond the measurements of the air film"};
+      "the wind is above 20 m/s, beyond the measurements of the air film",
+      "the weather's long-wave irradiance is below 0.4 of a black sky's: a gap in it?"};
   return kTexts[static_cast<std::size_t>(which)];
 }
 
@@ -58,6 +60,9 @@ inline void add(HeatLimits& limits, HeatLimit which) noexcept {
 inline constexpr double kSnowAirK = 274.15;
 /// Wind up to which the film has been measured.
 inline constexpr double kMostFilmWindMS = 20.0;
+/// Least long-wave irradiance of a sky, by that of a blackbody at the air's temperature: the driest
+/// air measured, 5 km up in the Atacama desert and over Antarctica, sends 0.45 to 0.6.
+inline constexpr double kLeastSkyFrac = 0.4;
 /// Time for which a frame names a limit after it was passed: half a millimetre of water dries
 /// within six hours by day, and a surface forgets what it lacked.
 inline constexpr std::int64_t kLimitMemoryNs = 6 * 3'600'000'000'000;

@@ -109,6 +109,51 @@ TEST(CliFitMeasured, says_aloud_what_does_not_hold) {
   EXPECT_EQ(dry.out.find("speaks of"), std::string::npos) << dry.out;
 }
 
+TEST(CliFitMeasured, names_a_sun_that_stands_elsewhere) {
+  const TemporaryFolder folder;
+  write_text(folder.file("day.csv"), logger_text(kHeader));
+  const ProcessResult right = run_emit({"fit", "--measured", folder.file("day.csv")});
+  EXPECT_EQ(right.out.find("its time is not UTC"), std::string::npos) << right.out;
+  // Seven hours of local time are a hundred degrees of longitude.
+  const ProcessResult local =
+      run_emit({"fit", "--measured", folder.file("day.csv"), "--lon-deg=-95"});
+  ASSERT_EQ(local.exit_code, 0) << local.err;
+  EXPECT_THAT(local.out, HasSubstr("came while it stood below the horizon: its time is not UTC"));
+  // Direct and diffuse sun that add up to half of the global one.
+  std::istringstream lines(logger_text(kHeader));
+  std::string text;
+  for (std::string line; std::getline(lines, line);) {
+    if (line[0] == '#') {
+      text += line + "\n";
+    } else if (line.starts_with("time_s")) {
+      text += line + ",dni_w_m2,dhi_w_m2\n";
+    } else {
+      const std::size_t comma = line.find(',');
+      const double global = std::stod(line.substr(comma + 1));
+      text += fmt::format("{},{:.1f},{:.1f}\n", line, 0.0, 0.5 * global);
+    }
+  }
+  write_text(folder.file("half.csv"), text);
+  const ProcessResult half = run_emit({"fit", "--measured", folder.file("half.csv")});
+  ASSERT_EQ(half.exit_code, 0) << half.err;
+  EXPECT_THAT(half.out, HasSubstr("differs from the global sun by 50 % on average"));
+}
+
+TEST(CliFitMeasured, names_numbers_that_make_up_for_something_else) {
+  const TemporaryFolder folder;
+  // The surface is 30 K warmer than the weather explains.
+  std::vector<double> warm_k;
+  for (int i = 0; i <= 144; ++i) {
+    warm_k.push_back(325.0 + 12.0 * std::sin(2.0 * std::numbers::pi * i / 144.0 - 1.75));
+  }
+  write_text(folder.file("warm.csv"), logger_text(kHeader, 0.0, warm_k));
+  const ProcessResult warm =
+      run_emit({"fit", "--measured", folder.file("warm.csv"), "--json", folder.file("warm.json")});
+  ASSERT_EQ(warm.exit_code, 0) << warm.err;
+  EXPECT_THAT(warm.out, HasSubstr("DOES NOT HOLD: "));
+  EXPECT_THAT(read_text(folder.file("warm.json")), HasSubstr("\"kind\": \"fit\""));
+}
+
 /// Numbers behind a key of a JSON text, in order.
 std::vector<double> json_numbers(const std::string& json, const std::string& key) {
   std::vector<double> out;

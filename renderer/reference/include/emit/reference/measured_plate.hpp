@@ -75,6 +75,12 @@ enum class PlateNumber : std::uint8_t { absorptance, inertia, film, base };
 /// Returns the member of a number.
 [[nodiscard]] double& value_of(PlateNumbers& numbers, PlateNumber which) noexcept;
 [[nodiscard]] const char* name_of(PlateNumber which) noexcept;
+/// Range in which a fit keeps a number.
+struct PlateRange {
+  double low = 0.0;
+  double high = 0.0;
+};
+[[nodiscard]] PlateRange range_of(PlateNumber which) noexcept;
 
 /// Fitted number with its confidence interval.
 struct PlateEstimate {
@@ -83,7 +89,7 @@ struct PlateEstimate {
   double standard_error = 0.0;  ///< in the number's own unit
   /// Ends of the simultaneous 99 % interval of all fitted numbers (Bonferroni). It comes from the
   /// curvature at the optimum and from residuals whose correlation in time is counted; it knows
-  /// nothing of errors of the model.
+  /// nothing of errors of the model, and ends where the range of the number does.
   double low = 0.0;
   double high = 0.0;
 };

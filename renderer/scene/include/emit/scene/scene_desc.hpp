@@ -98,18 +98,19 @@ struct BodyInterior {
   [[nodiscard]] bool operator==(const BodyInterior&) const = default;
 };
 
-/// Roughness of a surface by classes of DOE-2 and TARP.
+/// Roughness of a surface by classes of DOE-2 and TARP, and open water.
 enum class Roughness : std::uint8_t {
   very_rough,     ///< gravel, crops, tree crowns
   rough,          ///< brick, rough plaster, grass
   medium_rough,   ///< concrete, asphalt
   medium_smooth,  ///< sawn wood, fabric
   smooth,         ///< smooth plaster, painted metal
-  very_smooth,    ///< glass, polished metal, water
+  very_smooth,    ///< glass, polished metal
+  open_water,     ///< pond, lake, sea
 };
 /// Returns the factor R of physics.md eq. 34.
 [[nodiscard]] constexpr double roughness_factor(Roughness roughness) noexcept {
-  constexpr std::array<double, 6> kFactors{2.17, 1.67, 1.52, 1.13, 1.11, 1.0};
+  constexpr std::array<double, 7> kFactors{2.17, 1.67, 1.52, 1.13, 1.11, 1.0, 0.55};
   return kFactors[static_cast<std::size_t>(roughness)];
 }
 
