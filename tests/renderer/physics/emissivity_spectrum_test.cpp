@@ -175,10 +175,9 @@ TEST(EmissivityFold, the_total_emissivity_is_the_mean_over_a_blackbody) {
 
 TEST(EmissivityFold, the_apparent_temperature_inverts_the_radiance) {
   const EmissivityFold fold(Spectrum{{2.0, 1.0}, {20.0, 1.0}}, kBell, Kelvin(250.0));
-  const SpectralAir air = level_air(5000.0);
   for (const double kelvin : {120.0, 250.0, 300.0, 900.0}) {
-    const double radiance = fold.black_w_m2_sr(Kelvin(kelvin), air);
-    EXPECT_NEAR(fold.apparent(radiance, Kelvin(300.0), air).value(), kelvin, 1e-5);
+    const double radiance = fold.black_w_m2_sr(Kelvin(kelvin));
+    EXPECT_NEAR(fold.apparent(radiance, Kelvin(300.0)).value(), kelvin, 1e-5);
   }
   EXPECT_EQ(fold.apparent(0.0, Kelvin(300.0)).value(), 0.0);
 }
@@ -227,6 +226,20 @@ TEST(EmissivityErrors, a_grey_surface_has_none_and_air_makes_some_of_another) {
   const EmissivityFold slope(Spectrum{{3.0, 0.6}, {5.0, 1.0}}, kMwir, Kelvin(250.0));
   const double folded = slope.at(Kelvin(300.0), air.folded).emissivity_frac;
   const EmissivityErrors some = emissivity_errors(slope, folded, range, air);
+  double air_k = 0.0;
+  const double black = band_radiance(kMwir, Kelvin(300.0)).radiance_w_m2_sr;
+  for (const SpectralAir& path : {SpectralAir(), air.longest}) {
+    const auto eps = [](double um) { return 0.6 + 0.2 * (um - 3.0); };
+    const auto tau = [&](double um) { return path.transmittance_frac(um); };
+    const double passed = brute_mean(kMwir, 300.0, tau);
+    const auto shown_k = [&](double emissivity_frac) {
+      const Radiance seen(black * (1.0 - passed + emissivity_frac * passed));
+      return brightness_temperature(kMwir, seen)->value();
+    };
+    air_k =
+        std::max(air_k, std::abs(shown_k(folded) - shown_k(brute_mean(kMwir, 300.0, eps, tau))));
+  }
+  EXPECT_NEAR(some.air_k, air_k, 2e-4);
   EXPECT_GT(some.air_k, 0.05);
   EXPECT_GE(some.largest_k, std::max(some.air_k, some.temperature_k));
 }

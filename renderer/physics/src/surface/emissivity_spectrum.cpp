@@ -23,8 +23,6 @@ constexpr double kWholeLeastX = 0.01;
 constexpr double kWholeGreatestX = 60.0;
 /// Temperatures at which an emissivity is judged, evenly over their range.
 constexpr int kJudged = 9;
-/// Least share of the light that passes air in which an emissivity is judged.
-constexpr double kUnseenFrac = 1e-3;
 
 double um_of(double per_cm) noexcept {
   return 1e4 / per_cm;
@@ -154,13 +152,12 @@ double EmissivityFold::black_w_m2_sr(Kelvin source, const SpectralAir& air) cons
   return sums(source.value(), air).black;
 }
 
-Kelvin EmissivityFold::apparent(double radiance_w_m2_sr, Kelvin near,
-                                const SpectralAir& air) const noexcept {
+Kelvin EmissivityFold::apparent(double radiance_w_m2_sr, Kelvin near) const noexcept {
   if (!(radiance_w_m2_sr > 0.0)) return Kelvin(0.0);
   // The logarithm of the radiance is nearly straight over 1/T.
   double kelvin = near.value();
   for (int i = 0; i < 30; ++i) {
-    const Sums now = sums(kelvin, air);
+    const Sums now = sums(kelvin, {});
     if (!(now.black > 0.0 && now.slope_per_k > 0.0)) break;
     const double miss = std::log(now.black / radiance_w_m2_sr);
     const double step = miss * now.black / (kelvin * kelvin * now.slope_per_k);
@@ -181,38 +178,30 @@ EmissivityFold::Folded total_emissivity(std::span<const EmissivityPoint> spectru
 
 EmissivityErrors emissivity_errors(const EmissivityFold& fold, double emissivity_frac,
                                    const JudgedRange& range, const JudgedAir& air) {
-  // Temperatures that emission and reflected light `more` show with the spectrum and without it.
+  // Temperatures that a picture shows with the spectrum and without it, where the surface also
+  // reflects light. The air in between is as warm as the surface.
   const auto apart_k = [&](Kelvin surface, const SpectralAir& seen_through, double true_frac,
-                           double true_more, double more) {
+                           double true_reflected, double reflected) {
     const double black = fold.black_w_m2_sr(surface, seen_through);
-    const double truth =
-        fold.apparent(true_frac * black + true_more, surface, seen_through).value();
-    const double given =
-        fold.apparent(emissivity_frac * black + more, surface, seen_through).value();
+    const double path = fold.black_w_m2_sr(surface) - black;
+    const double truth = fold.apparent(true_frac * black + true_reflected + path, surface).value();
+    const double given = fold.apparent(emissivity_frac * black + reflected + path, surface).value();
     return std::abs(given - truth);
   };
   const auto emission_k = [&](Kelvin surface, const SpectralAir& seen_through) {
     return apart_k(surface, seen_through, fold.at(surface, seen_through).emissivity_frac, 0.0, 0.0);
   };
   EmissivityErrors out;
-  std::vector<SpectralAir> paths{air.folded, SpectralAir()};
-  // Nothing of a surface shows behind air that swallows nearly all of its light.
-  if (fold.black_w_m2_sr(range.reference, air.longest) >
-      kUnseenFrac * fold.black_w_m2_sr(range.reference)) {
-    paths.push_back(air.longest);
-  }
   for (int i = 0; i < kJudged; ++i) {
     const Kelvin surface(std::lerp(range.least.value(), range.greatest.value(),
                                    static_cast<double>(i) / (kJudged - 1)));
-    out.temperature_k = std::max(out.temperature_k, emission_k(surface, paths[0]));
-    for (const SpectralAir& path : paths) {
-      out.largest_k = std::max(out.largest_k, emission_k(surface, path));
-    }
+    const double folded_k = emission_k(surface, air.folded);
+    out.temperature_k = std::max(out.temperature_k, folded_k);
+    out.largest_k = std::max(
+        {out.largest_k, folded_k, emission_k(surface, {}), emission_k(surface, air.longest)});
     if (range.least.value() == range.greatest.value()) break;
   }
-  for (const SpectralAir& path : paths) {
-    out.air_k = std::max(out.air_k, emission_k(range.reference, path));
-  }
+  out.air_k = std::max(emission_k(range.reference, {}), emission_k(range.reference, air.longest));
   out.largest_k = std::max(out.largest_k, out.air_k);
   // Reflected sunlight: irradiance by pi, through the same air as the emission.
   const Kelvin sun(kSunTemperatureK);

@@ -58,10 +58,9 @@ class EmissivityFold {
   /// Returns the radiance of a blackbody in the band behind air, W m-2 sr-1. The path itself adds
   /// nothing.
   [[nodiscard]] double black_w_m2_sr(Kelvin source, const SpectralAir& air = {}) const noexcept;
-  /// Returns the temperature of the blackbody that has a radiance in the band behind air; 0 K for a
-  /// radiance that is not positive. `near` begins the search.
-  [[nodiscard]] Kelvin apparent(double radiance_w_m2_sr, Kelvin near,
-                                const SpectralAir& air = {}) const noexcept;
+  /// Returns the temperature of the blackbody that has a radiance in the band; 0 K for a radiance
+  /// that is not positive. `near` begins the search.
+  [[nodiscard]] Kelvin apparent(double radiance_w_m2_sr, Kelvin near) const noexcept;
 
  private:
   static constexpr std::size_t kNoPiece = static_cast<std::size_t>(-1);
@@ -90,11 +89,9 @@ class EmissivityFold {
 
 /// Paths through the air over which an emissivity is judged.
 struct JudgedAir {
-  SpectralAir folded;  ///< that of the folding
-  /// The longest path, which does not count where it passes less than a thousandth of the light.
-  /// The shortest one is no air.
-  SpectralAir longest;
-  SpectralAir sun;  ///< from the sun to the surface
+  SpectralAir folded;   ///< that of the folding
+  SpectralAir longest;  ///< the longest path; the shortest one is no air
+  SpectralAir sun;      ///< from the sun to the surface
 };
 /// Temperatures over which an emissivity is judged.
 struct JudgedRange {
@@ -102,8 +99,9 @@ struct JudgedRange {
   Kelvin least;
   Kelvin greatest;
 };
-/// Largest errors of one emissivity in place of a spectrum, in kelvin of apparent temperature. They
-/// are those of emission alone, which surroundings that the surface reflects make smaller.
+/// Largest errors of one emissivity in place of a spectrum, in kelvin of apparent temperature of a
+/// picture. Those of emission count without what the surface reflects, and the air on the path
+/// emits at the temperature of the surface.
 struct EmissivityErrors {
   double temperature_k = 0.0;  ///< over the temperatures, behind the air of the folding
   double air_k = 0.0;          ///< over no air and the longest path, at the reference
