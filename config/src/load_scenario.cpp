@@ -348,7 +348,8 @@ Result<std::vector<scene::Material>> load_materials(const std::filesystem::path&
     }
   }
   const std::vector<Node> nodes = collect_material_nodes(*parsed, {}, diagnostics);
-  // The bands of a library are those of the scenarios that name it.
+  // The bands of a library are those of the scenarios that name it; spectra are folded over the
+  // built-in ones, behind mid-latitude air in summer.
   std::vector<std::string> bands = known_band_names({});
   for (const Node& node : nodes) {
     const Node* of_bands = node.find("band_emissivity_frac");
@@ -356,6 +357,10 @@ Result<std::vector<scene::Material>> load_materials(const std::filesystem::path&
     for (const Member& member : of_bands->members) bands.push_back(member.key);
   }
   auto materials = resolve_materials(nodes, bands, diagnostics);
+  ScenarioDesc usual;
+  usual.bands = built_in_bands();
+  std::vector<std::string> warnings;  // whoever shows the materials has the errors in them
+  fold_spectra(nodes, usual, UncoveredBand::skip, materials, warnings, diagnostics);
   check_glosses(nodes, {}, {}, materials, diagnostics);
   if (!diagnostics.empty()) return tl::unexpected<physics::Error>(diagnostics.error());
   return materials;
@@ -425,8 +430,13 @@ Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
   scenario.bands = bands_in_use(scenario.channels, declared);
   scenario.atmosphere = resolve_atmosphere(root, scenario, diagnostics);
 
-  scenario.materials = resolve_materials(pool.members[0].value.items, known, diagnostics);
-  check_glosses(pool.members[0].value.items, scenario, declared, scenario.materials, diagnostics);
+  const std::vector<Node>& material_nodes = pool.members[0].value.items;
+  scenario.materials = resolve_materials(material_nodes, known, diagnostics);
+  scenario.objects =
+      resolve_objects(root, scenario.materials, options.require_scene_files, diagnostics);
+  fold_spectra(material_nodes, scenario, UncoveredBand::refuse, scenario.materials,
+               scenario.warnings, diagnostics);
+  check_glosses(material_nodes, scenario, declared, scenario.materials, diagnostics);
   complete_band_emissivities(scenario.bands, scenario.materials);
   resolve_clutter(root, scenario.thermal, known, scenario.materials, diagnostics);
   // The renderer gets only bands that a channel shows, and emissivities in those bands.
@@ -445,8 +455,6 @@ Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
   scenario.sensor = resolve_sensor(root, diagnostics);
   warn_of_camera_above_clouds(scenario);
   warn_of_clouds_that_outrun_steps(scenario);
-  scenario.objects =
-      resolve_objects(root, scenario.materials, options.require_scene_files, diagnostics);
   check_parts_vary_not(root, scenario, diagnostics);
   scenario.contacts = resolve_contacts(root, scenario.objects, scenario.materials, diagnostics);
   scenario.gas = resolve_gas(root, scenario.objects, known, diagnostics);

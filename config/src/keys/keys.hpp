@@ -241,6 +241,36 @@ Key<T> band_numbers(std::string name, std::string unit, Range range, Field field
       });
 }
 
+/// A curve over wavelength: an array of pairs [um, frac]. The field is a vector of structs of these
+/// two numbers.
+template <class T, class Field>
+Key<T> curve(std::string name, Field field, std::string meaning) {
+  return custom<T>(
+      {name, "array of [um, frac]", "um, 1", "2 or more, ascending, frac in 0 .. 1",
+       std::move(meaning), false},
+      [name, field](T& out, const Node& node, Diagnostics& diagnostics) {
+        if (node.kind != Node::Kind::array) {
+          diagnostics.add(node.at, "'" + name + "' must be an array of pairs [um, frac]");
+          return;
+        }
+        field(out).clear();
+        for (const Node& item : node.items) {
+          double pair[2] = {0.0, 0.0};
+          read_vector(item, name, 2, pair, diagnostics);
+          field(out).push_back({pair[0], pair[1]});
+        }
+      },
+      [field](const T& in) -> std::optional<std::string> {
+        if (field(in).empty()) return std::nullopt;
+        std::string text = "[";
+        for (const auto& [wavelength_um, share_frac] : field(in)) {
+          const double pair[2] = {wavelength_um, share_frac};
+          text += (text.size() > 1 ? ", " : "") + toml_vector(pair, 2);
+        }
+        return text + "]";
+      });
+}
+
 /// Three numbers, which are multiplied by `scale` when they are read. Nothing is written where the
 /// field has no value.
 template <class T, class Field>

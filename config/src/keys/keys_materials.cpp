@@ -200,6 +200,15 @@ Key<Material> base_k_key() {
   return written_if([](const Material& in) { return in.base_stated; }, std::move(key));
 }
 
+/// Key of the file of a spectrum. It is not written, because the samples are.
+Key<Material> emissivity_spectrum_file_key() {
+  return written_if(
+      [](const Material&) { return false; },
+      path<Material>("emissivity_spectrum_file", EMIT_FIELD(emissivity_spectrum.file),
+                     "CSV file `wavelength_um,emissivity_frac` or `wavelength_um,reflectance_frac` "
+                     "in place of `emissivity_spectrum`."));
+}
+
 }  // namespace
 
 const KeyTable<MaterialSpread>& spread_keys() {
@@ -226,12 +235,17 @@ const KeyTable<Material>& material_keys() {
       required(number<Material>("solar_absorptance_frac", "", between(0, 1),
                                 EMIT_FIELD(solar_absorptance_frac),
                                 "Share of sunlight that is absorbed: 1 - albedo.")),
-      required(number<Material>("emissivity_frac", "", between(0.01, 1),
-                                EMIT_FIELD(emissivity_frac),
-                                "Total hemispherical emissivity in the long-wave infrared.")),
+      open_default(number<Material>(
+          "emissivity_frac", "", between(0.01, 1), EMIT_FIELD(emissivity_frac),
+          "Total hemispherical emissivity in the long-wave infrared. Required without a spectrum "
+          "that covers 60 % of what a blackbody emits.")),
       band_emissivity_key<Material>(
-          "Emissivities by name of the band. Other bands take that of the listed built-in band "
-          "that they overlap most, else `emissivity_frac`."),
+          "Emissivities by name of the band. Other bands take that of the spectrum, else of the "
+          "listed "
+          "built-in band that they overlap most, else `emissivity_frac`."),
+      curve<Material>("emissivity_spectrum", EMIT_FIELD(emissivity_spectrum.samples),
+                      "Emissivity over wavelength, linear between its points. See Spectra."),
+      emissivity_spectrum_file_key(),
       layers_key(),
       choice<Material>("roughness",
                        std::vector<std::pair<std::string, Roughness>>{

@@ -488,34 +488,9 @@ const KeyTable<BandDraft>& band_keys() {
                  boolean<BandDraft>("photons", EMIT_FIELD(desc.photons),
                                     "The response is that per photon, as a photon detector has it. "
                                     "Without it the response is per power.")),
-      custom<BandDraft>(
-          {"response", "array of [um, frac]", "um, 1", "2 or more, ascending, frac in 0 .. 1",
-           "Relative spectral response, linear between its points. Without it the band is a "
-           "perfect rectangle.",
-           false},
-          [](BandDraft& out, const Node& node, Diagnostics& diagnostics) {
-            if (node.kind != Node::Kind::array) {
-              diagnostics.add(node.at, "'response' must be an array of pairs [um, frac]");
-              return;
-            }
-            out.desc.response.clear();
-            for (const Node& item : node.items) {
-              double pair[2] = {0.0, 0.0};
-              read_vector(item, "response", 2, pair, diagnostics);
-              out.desc.response.push_back({pair[0], pair[1]});
-            }
-          },
-          [](const BandDraft& in) -> std::optional<std::string> {
-            if (in.desc.response.empty()) {
-              return std::nullopt;
-            }
-            std::string out = "[";
-            for (const scene::ResponseSample& sample : in.desc.response) {
-              const double pair[2] = {sample.wavelength_um, sample.response_frac};
-              out += (out.size() > 1 ? ", " : "") + toml_vector(pair, 2);
-            }
-            return out + "]";
-          }),
+      curve<BandDraft>("response", EMIT_FIELD(desc.response),
+                       "Relative spectral response, linear between its points. Without it the band "
+                       "is a perfect rectangle."),
       path<BandDraft>("response_file", EMIT_FIELD(response_file),
                       "CSV file `wavelength_um,response_frac` in place of `response`."),
   };

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -26,6 +27,20 @@ void check_glosses(const std::vector<Node>& nodes, const scene::ScenarioDesc& sc
 [[nodiscard]] std::vector<scene::Material> resolve_materials(
     const std::vector<Node>& nodes, const std::vector<std::string>& known_bands,
     Diagnostics& diagnostics);
+
+/// Fate of a band that a spectrum of emissivity does not reach.
+enum class UncoveredBand : std::uint8_t {
+  refuse,  ///< a fault
+  skip,    ///< it stays without an emissivity of its own
+};
+/// Folds the spectra of materials: emissivities of the bands of `scenario` that the material does
+/// not list, the total one unless it is stated, and their errors. Warns of errors, and of bands
+/// that a spectrum covers in part. Bands, atmosphere, place and objects of the scenario are read
+/// already.
+/// @param nodes  of the materials, in their order
+void fold_spectra(const std::vector<Node>& nodes, const scene::ScenarioDesc& scenario,
+                  UncoveredBand uncovered, std::vector<scene::Material>& materials,
+                  std::vector<std::string>& warnings, Diagnostics& diagnostics);
 
 /// Names of the built-in bands and of `declared`.
 [[nodiscard]] std::vector<std::string> known_band_names(

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "check_curve.hpp"
 #include "emit/config/slab_modes.hpp"
 #include "emit/scene/gloss_optics.hpp"
 #include "resolve.hpp"
@@ -120,6 +121,10 @@ void check_material(const Material& material, const Node& node,
   if (node.has("name") && material.name.empty()) {
     diagnostics.add(key_location(node, "name"), "'name' is empty");
   }
+  if (!node.has("emissivity_frac") && !node.has("emissivity_spectrum") &&
+      !node.has("emissivity_spectrum_file")) {
+    diagnostics.add(node.at, "key 'emissivity_frac' is missing");
+  }
   if (!material.prescribed_k) {
     if (!node.has("layers")) {
       diagnostics.add(node.at, fmt::format("key 'layers' is missing (material '{}' has no "
@@ -207,6 +212,37 @@ std::vector<Node> collect_material_nodes(const Node& root,
   return nodes;
 }
 
+namespace {
+
+/// Reads the spectrum of a material and checks it.
+void resolve_spectrum(Material& material, const Node& node, Diagnostics& diagnostics) {
+  constexpr std::string_view kInline = "emissivity_spectrum";
+  constexpr std::string_view kFile = "emissivity_spectrum_file";
+  scene::EmissivitySpectrum& spectrum = material.emissivity_spectrum;
+  if (node.has(kInline) && node.has(kFile)) {
+    diagnostics.add(key_location(node, kFile),
+                    fmt::format("use only one of '{}' and '{}'", kInline, kFile));
+    return;
+  }
+  if (!spectrum.file.empty()) {
+    auto loaded = load_emissivity_csv(spectrum.file);
+    if (!loaded) {
+      report_file_error(loaded.error(), node, kFile, diagnostics);
+      return;
+    }
+    spectrum.samples = std::move(*loaded);
+  }
+  const std::string_view key = node.has(kInline) ? kInline : kFile;
+  if (node.has(key)) {
+    // The stand-in keeps checks before fold_spectra() from finding faults in a missing number.
+    if (!node.has("emissivity_frac")) material.emissivity_frac = 0.5;
+    check_curve(spectrum.samples, fmt::format("'{}'", key), "emissivity", key_location(node, key),
+                diagnostics);
+  }
+}
+
+}  // namespace
+
 std::vector<Material> resolve_materials(const std::vector<Node>& nodes,
                                         const std::vector<std::string>& known_bands,
                                         Diagnostics& diagnostics) {
@@ -215,6 +251,7 @@ std::vector<Material> resolve_materials(const std::vector<Node>& nodes,
     Material material;
     const std::size_t faults = diagnostics.size();
     read_table(node, material_keys(), material, diagnostics);
+    if (diagnostics.size() == faults) resolve_spectrum(material, node, diagnostics);
     check_material(material, node, known_bands, diagnostics);
     if (diagnostics.size() == faults && material.modes.empty() && !material.layers.empty()) {
       material.modes = slab_modes(material.layers.front(), kSlabModesFilmWPerM2K,

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "check_curve.hpp"
 #include "emit/physics/constants.hpp"
 #include "resolve.hpp"
 
@@ -35,29 +36,10 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
 }
 
 void check_response(const SpectralBand& band, const Location& at, Diagnostics& diagnostics) {
-  if (band.response.size() < 2) {
-    diagnostics.add(at, "a response needs at least two samples");
-    return;
-  }
-  double peak = 0.0;
-  for (std::size_t i = 0; i < band.response.size(); ++i) {
-    const scene::ResponseSample& sample = band.response[i];
-    if (!(sample.response_frac >= 0.0 && sample.response_frac <= 1.0)) {
-      diagnostics.add(at, fmt::format("the response at {} um is {}, must be 0 .. 1",
-                                      sample.wavelength_um, sample.response_frac));
-      return;
-    }
-    if (i > 0 && sample.wavelength_um <= band.response[i - 1].wavelength_um) {
-      diagnostics.add(at,
-                      fmt::format("the wavelengths of a response must ascend ({} um follows {})",
-                                  sample.wavelength_um, band.response[i - 1].wavelength_um));
-      return;
-    }
-    peak = std::max(peak, sample.response_frac);
-  }
-  if (peak <= 0.0) {
-    diagnostics.add(at, "the response is zero everywhere");
-  }
+  if (!check_curve(band.response, "a response", "response", at, diagnostics)) return;
+  const bool dark = std::ranges::all_of(
+      band.response, [](const auto& sample) { return sample.response_frac <= 0.0; });
+  if (dark) diagnostics.add(at, "the response is zero everywhere");
 }
 
 SpectralBand resolve_band(const Node& node, Diagnostics& diagnostics) {

@@ -119,21 +119,61 @@ Result<scene::Trajectory> load_trajectory_csv(const std::filesystem::path& file)
   return out;
 }
 
-Result<std::vector<scene::ResponseSample>> load_response_csv(const std::filesystem::path& file) {
-  const Result<std::vector<TableRow>> rows = read_typed_table(
-      file, {{"wavelength_um", true, between(0.2, 100)}, {"response_frac", true, between(0, 1)}});
-  if (!rows) {
-    return tl::unexpected<physics::Error>(rows.error());
-  }
-  std::vector<scene::ResponseSample> out;
-  for (const TableRow& row : *rows) {
-    if (!out.empty() && *row.numbers[0] <= out.back().wavelength_um) {
+namespace {
+
+/// Reads a table over wavelength, which ascends.
+Result<std::vector<TableRow>> read_curve_csv(const std::filesystem::path& file,
+                                             std::vector<TableColumn> shares) {
+  shares.insert(shares.begin(), {"wavelength_um", true, kWavelengthUm});
+  Result<std::vector<TableRow>> rows = read_typed_table(file, shares);
+  if (!rows) return rows;
+  for (std::size_t i = 1; i < rows->size(); ++i) {
+    if (*(*rows)[i].numbers[0] <= *(*rows)[i - 1].numbers[0]) {
       return make_error(ErrorCode::config,
-                        at_line(file, row, "'wavelength_um' is not above the row before"));
+                        at_line(file, (*rows)[i], "'wavelength_um' is not above the row before"));
     }
-    out.push_back({*row.numbers[0], *row.numbers[1]});
+  }
+  return rows;
+}
+
+}  // namespace
+
+Result<std::vector<scene::ResponseSample>> load_response_csv(const std::filesystem::path& file) {
+  const auto rows = read_curve_csv(file, {{"response_frac", true, between(0, 1)}});
+  if (!rows) return tl::unexpected<physics::Error>(rows.error());
+  std::vector<scene::ResponseSample> out;
+  for (const TableRow& row : *rows) out.push_back({*row.numbers[0], *row.numbers[1]});
+  return out;
+}
+
+Result<std::vector<scene::EmissivitySample>> load_emissivity_csv(
+    const std::filesystem::path& file) {
+  const auto rows = read_curve_csv(file, {{"emissivity_frac", false, between(0, 1)},
+                                          {"reflectance_frac", false, between(0, 1)}});
+  if (!rows) return tl::unexpected<physics::Error>(rows.error());
+  const bool emitted = rows->front().numbers[1].has_value();
+  std::vector<scene::EmissivitySample> out;
+  for (const TableRow& row : *rows) {
+    const auto fail = [&](std::string_view text) {
+      return make_error(ErrorCode::config, at_line(file, row, text));
+    };
+    if (row.numbers[1] && row.numbers[2]) {
+      return fail("use only one of 'emissivity_frac' and 'reflectance_frac'");
+    }
+    if (!row.numbers[1] && !row.numbers[2]) {
+      return fail("neither 'emissivity_frac' nor 'reflectance_frac' is given");
+    }
+    if (row.numbers[1].has_value() != emitted) {
+      return fail("'emissivity_frac' and 'reflectance_frac' change places");
+    }
+    out.push_back({*row.numbers[0], emitted ? *row.numbers[1] : 1.0 - *row.numbers[2]});
   }
   return out;
+}
+
+std::string wavelength_hint(double wavelength_um) {
+  if (!(wavelength_um > kWavelengthUm.hi)) return {};
+  return "; this looks like nanometres or wavenumbers, wanted are micrometres";
 }
 
 }  // namespace emit::config

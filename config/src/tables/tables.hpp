@@ -6,6 +6,7 @@
 
 #include "emit/physics/error.hpp"
 #include "emit/scene/scene_desc.hpp"
+#include "keys/key.hpp"
 
 /// Readers of the CSV files that a scenario names.
 namespace emit::config {
@@ -22,6 +23,15 @@ namespace emit::config {
     const std::filesystem::path& file);
 [[nodiscard]] physics::Result<std::vector<scene::ResponseSample>> load_response_csv(
     const std::filesystem::path& file);
+/// The column beside the wavelengths is an emissivity, or a reflectance, which is 1 - emissivity.
+[[nodiscard]] physics::Result<std::vector<scene::EmissivitySample>> load_emissivity_csv(
+    const std::filesystem::path& file);
+
+/// Wavelengths that curves may have, um.
+inline const Range kWavelengthUm = between(0.2, 100);
+/// Returns a hint for a wavelength that is more likely another unit: "; this looks like ...", or
+/// an empty text.
+[[nodiscard]] std::string wavelength_hint(double wavelength_um);
 
 /// Reads the air of `bands` from a file: CSV as below with bands of `known_bands`, or output of
 /// MODTRAN (tape7.hpp), which is integrated over those of `bands` that it covers.

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "emit/physics/csv.hpp"
+#include "tables.hpp"
 
 namespace emit::config {
 
@@ -100,6 +101,12 @@ std::vector<std::size_t> match_header(const CsvReader& reader,
   return where;
 }
 
+/// Returns what a number looks like that is out of its range; may be empty.
+std::string unit_hint(std::string_view column, double value) {
+  if (column == "time_s") return physics::unix_time_hint(value);
+  return column == "wavelength_um" ? wavelength_hint(value) : std::string();
+}
+
 /// Reads one number of a row; an empty text means success.
 std::string read_number_cell(const CsvCell& cell, const TableColumn& column,
                              std::optional<double>& number) {
@@ -112,7 +119,7 @@ std::string read_number_cell(const CsvCell& cell, const TableColumn& column,
   }
   if (!column.range.contains(*value)) {
     return fmt::format("'{}' is {}, must be {}{}", column.name, *value, column.range.to_string(),
-                       column.name == "time_s" ? physics::unix_time_hint(*value) : std::string());
+                       unit_hint(column.name, *value));
   }
   number = value;
   return {};

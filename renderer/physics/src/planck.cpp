@@ -2,52 +2,19 @@
 #include "emit/physics/planck.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <string>
 
+#include "emit/physics/numerics/gauss_rule.hpp"
+
 namespace emit::physics {
 namespace {
 
-// Symmetric 16-point Gauss-Legendre rule on [-1, 1]. Newton's method on the Legendre polynomial
-// finds its abscissae and weights, so that no number is typed.
 constexpr int kPoints = 16;
-struct GaussRule {
-  std::array<double, kPoints> node{};
-  std::array<double, kPoints> weight{};
-};
 
-GaussRule gauss_legendre() noexcept {
-  GaussRule rule;
-  for (int i = 0; i < kPoints; ++i) {
-    double z = std::cos(kPi * (i + 0.75) / (kPoints + 0.5));
-    double slope = 1.0;
-    for (int iteration = 0; iteration < 20; ++iteration) {
-      // Evaluate the polynomial by its three-term recurrence, then its derivative.
-      double p0 = 1.0;
-      double p1 = z;
-      for (int n = 2; n <= kPoints; ++n) {
-        const double p2 = ((2 * n - 1) * z * p1 - (n - 1) * p0) / n;
-        p0 = p1;
-        p1 = p2;
-      }
-      slope = kPoints * (z * p1 - p0) / (z * z - 1.0);
-      const double step = p1 / slope;
-      z -= step;
-      if (std::abs(step) < 1e-16) {
-        break;
-      }
-    }
-    const auto at = static_cast<std::size_t>(i);
-    rule.node[at] = z;
-    rule.weight[at] = 2.0 / ((1.0 - z * z) * slope * slope);
-  }
-  return rule;
-}
-
-const GaussRule& gauss() noexcept {
-  static const GaussRule rule = gauss_legendre();
+const GaussRule<kPoints>& gauss() noexcept {
+  static const GaussRule<kPoints> rule = gauss_legendre<kPoints>();
   return rule;
 }
 
@@ -78,7 +45,7 @@ void add_stretch(double lo_um, double hi_um, double response_lo, double response
   // Split the stretch into equal panels and sum 16 points on each.
   const double slope = (response_hi - response_lo) / (hi_um - lo_um);
   const int panels = static_cast<int>(std::ceil((x_end - x) / kPanelWidth));
-  const GaussRule& rule = gauss();
+  const GaussRule<kPoints>& rule = gauss();
   const double half = 0.5 * (x_end - x) / panels;
   for (int panel = 0; panel < panels; ++panel) {
     const double middle = x + half * (2 * panel + 1);

@@ -21,6 +21,7 @@ std::string fit_key(scene::Material material) {
   material.foster_modes.clear();
   material.foster_fit.reset();
   material.band_emissivity.clear();
+  material.emissivity_spectrum = {};
   material.family.clear();
   material.source.clear();
   material.spread.reset();

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 
+#include "tool/lab/spectra_report.hpp"
 #include "tool/support/console.hpp"
 
 namespace emit::tool {
@@ -105,8 +106,24 @@ std::vector<std::size_t> members_of(std::span<const MaterialEntry> entries,
   return members;
 }
 
+std::vector<Material> materials_of(std::span<const MaterialEntry> entries) {
+  std::vector<Material> out;
+  for (const MaterialEntry& entry : entries) out.push_back(entry.material);
+  return out;
+}
+
 std::string family_name(const std::string& family) {
   return family.empty() ? "without a family" : family;
+}
+
+/// Emissivity of a band, with its range or with the error of the folding.
+std::string band_text(const Material& material, const std::string& band) {
+  if (not_covered(material, band)) return "not in spectrum";
+  const double value = emissivity_of(material, band);
+  if (const scene::FoldedBand* folded = folded_band(material, band)) {
+    return fmt::format("{:.3f}, {:.2f} K", value, folded->largest_k);
+  }
+  return with_spread(value, emissivity_spread(material, band));
 }
 
 /// Adds the rows of one comparison table.
@@ -132,10 +149,10 @@ void add_rows(TextTable& table, std::span<const MaterialEntry> entries) {
     return with_spread(m.emissivity_frac, m.spread ? m.spread->emissivity_frac : 0.0);
   });
   for (const char* band : kBands) {
-    row(fmt::format("  {} um", band), [&](const MaterialEntry& e) {
-      return with_spread(emissivity_of(e.material, band), emissivity_spread(e.material, band));
-    });
+    row(fmt::format("  {} um", band),
+        [&](const MaterialEntry& e) { return band_text(e.material, band); });
   }
+  row("  spectrum", [](const MaterialEntry& e) { return spectrum_text(e.material); });
   row("roughness", [](const MaterialEntry& e) {
     return std::string(kRoughnesses.at(static_cast<std::size_t>(e.material.roughness)));
   });
@@ -199,6 +216,9 @@ Json entry_json(const MaterialEntry& entry) {
   out.set("solar_absorptance_frac", m.solar_absorptance_frac);
   out.set("emissivity_frac", m.emissivity_frac);
   out.set("band_emissivity_frac", bands_json(m.band_emissivity));
+  if (!m.emissivity_spectrum.samples.empty()) {
+    out.set("emissivity_spectrum", spectrum_json(m.emissivity_spectrum));
+  }
   if (m.spread) {
     out.set("spread", Json::object()
                           .set("solar_absorptance_frac", m.spread->solar_absorptance_frac)
@@ -285,6 +305,7 @@ Plot band_plot(std::span<const MaterialEntry> entries, const std::string& family
     const double shift =
         kSpread * ((static_cast<double>(place) + 0.5) / static_cast<double>(members.size()) - 0.5);
     for (std::size_t i = 0; i < kBands.size(); ++i) {
+      if (not_covered(material, kBands[i])) continue;
       const double value = emissivity_of(material, kBands[i]);
       const double half = emissivity_spread(material, kBands[i]);
       series.points.push_back(
@@ -320,9 +341,8 @@ void print_materials(std::FILE* out, std::span<const MaterialEntry> entries) {
       const bool fitted = m.foster_fit.has_value();
       table.add({"  " + m.name + (m.dry_layers_valid ? "" : " *"),
                  with_spread(m.solar_absorptance_frac, spread.solar_absorptance_frac),
-                 with_spread(m.emissivity_frac, spread.emissivity_frac),
-                 with_spread(emissivity_of(m, "3-5"), emissivity_spread(m, "3-5")),
-                 with_spread(emissivity_of(m, "8-12"), emissivity_spread(m, "8-12")),
+                 with_spread(m.emissivity_frac, spread.emissivity_frac), band_text(m, "3-5"),
+                 band_text(m, "8-12"),
                  layers ? fmt::format("{:.0f}", inertia(m))
                         : fmt::format("{:.0f} K", m.prescribed_k.value_or(0.0)),
                  layers ? share_text(spread.conductivity_frac) : "-",
@@ -337,6 +357,7 @@ void print_materials(std::FILE* out, std::span<const MaterialEntry> entries) {
              "layers: melting, stirring or air that passes through matter\n"
              "{} materials; `emit materials NAME` shows layers, sources and a summer's day\n",
              entries.size());
+  print_spectra(out, materials_of(entries));
 }
 
 void print_comparison(std::FILE* out, std::span<const MaterialEntry> entries) {
@@ -349,6 +370,7 @@ void print_comparison(std::FILE* out, std::span<const MaterialEntry> entries) {
     add_rows(table, part);
     fmt::print(out, "{}\n", table.to_string());
   }
+  print_spectra(out, materials_of(entries));
   for (const MaterialEntry& entry : entries) {
     const Material& m = entry.material;
     fmt::print(out, "{}\n", m.name);
@@ -417,6 +439,10 @@ std::vector<Plot> material_plots(std::span<const MaterialEntry> entries,
   for (const std::string& family : families_of(entries)) {
     plots.push_back(day_plot(entries, family, climate));
     plots.push_back(band_plot(entries, family));
+    std::vector<Material> members;
+    for (const std::size_t i : members_of(entries, family)) members.push_back(entries[i].material);
+    Plot spectra = spectrum_plot(members, family_name(family));
+    if (!spectra.series.empty()) plots.push_back(std::move(spectra));
   }
   return plots;
 }

@@ -44,8 +44,8 @@ bool print_climates(std::FILE* out, std::span<const MaterialEntry> entries);
 
 [[nodiscard]] Json materials_json(std::span<const MaterialEntry> entries);
 
-/// Returns two diagrams per family: temperatures over the day, and emissivities by band with their
-/// uncertainty. The day ends at midnight.
+/// Returns diagrams per family: temperatures over the day, emissivities by band with their
+/// uncertainty, and spectra where there are any. The day ends at midnight.
 [[nodiscard]] std::vector<Plot> material_plots(std::span<const MaterialEntry> entries,
                                                const std::string& climate);
 

@@ -92,6 +92,40 @@ TEST(CliMaterials, the_check_finds_modes_that_miss_the_reference) {
   EXPECT_NE(slow.out.find(" !"), std::string::npos) << slow.out;
 }
 
+TEST(CliMaterials, a_spectrum_is_shown_with_what_it_was_folded_to) {
+  const TemporaryFolder folder;
+  write_text(folder.file("e.csv"),
+             "wavelength_um,reflectance_frac\n7,0.05\n9,0.1\n9.5,0.4\n14,0.02\n60,0.02\n");
+  write_text(folder.file("lib.toml"), R"(
+[[material]]
+name = "sand"
+family = "soils"
+solar_absorptance_frac = 0.6
+emissivity_spectrum_file = "e.csv"
+prescribed_k = 300
+)");
+  const ProcessResult list = run_emit({"materials", "--library", folder.file("lib.toml")});
+  ASSERT_EQ(list.exit_code, 0) << list.err;
+  EXPECT_NE(list.out.find("not in spectrum"), std::string::npos) << list.out;
+  EXPECT_NE(list.out.find("full sun K"), std::string::npos) << list.out;
+  const ProcessResult one =
+      run_emit({"materials", "sand", "--library", folder.file("lib.toml"), "--json",
+                folder.file("m.json"), "--plot", folder.file("m.svg")});
+  ASSERT_EQ(one.exit_code, 0) << one.err;
+  EXPECT_NE(one.out.find("7 to 60 um"), std::string::npos) << one.out;
+  const std::string json = read_text(folder.file("m.json"));
+  const std::string spectrum = json.substr(json.find("\"emissivity_spectrum\""));
+  const std::string lwir = spectrum.substr(spectrum.find("\"8-12\""));
+  const double folded = std::strtod(json_value(lwir, "emissivity_frac").c_str(), nullptr);
+  EXPECT_GT(folded, 0.6);
+  EXPECT_LT(folded, 0.9);
+  EXPECT_GT(std::strtod(json_value(lwir, "largest_error_k").c_str(), nullptr), 0.01);
+  EXPECT_EQ(spectrum.find("\"3-5\""), std::string::npos);
+  const std::string svg = read_text(folder.file("m.svg"));
+  EXPECT_NE(svg.find("soils: emissivity over wavelength"), std::string::npos);
+  EXPECT_NE(svg.find("sand, bands"), std::string::npos);
+}
+
 TEST(CliMaterials, a_wrong_name_or_climate_says_what_was_meant) {
   const ProcessResult name = run_emit({"materials", "lawm"});
   EXPECT_EQ(name.exit_code, 2);

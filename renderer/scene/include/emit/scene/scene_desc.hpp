@@ -18,6 +18,7 @@
 #include "emit/physics/weather.hpp"
 #include "emit/scene/channel_output.hpp"
 #include "emit/scene/clutter_desc.hpp"
+#include "emit/scene/emissivity_spectrum.hpp"
 #include "emit/scene/gas_desc.hpp"
 #include "emit/scene/gloss.hpp"
 
@@ -130,6 +131,7 @@ struct Material {
   double emissivity_frac = 0.0;                   ///< total hemispherical, long-wave
   Roughness roughness = Roughness::medium_rough;  ///< as the wind feels it; emit2014 ignores it
   std::vector<BandEmissivity> band_emissivity;    ///< bands not listed use emissivity_frac
+  EmissivitySpectrum emissivity_spectrum;         ///< source of both; may be empty
   std::vector<Layer> layers;                      ///< outermost first; emit2014 uses the first only
   BaseKind base = BaseKind::room;                 ///< what the last layer rests on
   /// Temperature under the last layer. resolve_bases() fills it unless the user states it.
