@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "surface/model/vertex_areas.hpp"
+#include "surface/rays/hot_parts.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -33,6 +34,7 @@ EntityExitance::EntityExitance(const SurfaceModel& model, const scene::SceneGeom
       // Leave out samples that another face covers: they lie inside the body.
       const SurfaceSample& sample = model.samples.samples[first + v];
       if (sample.covered || !(area_m2[v] > 0.0F)) continue;
+      if (HotParts::hot(geometry.materials[sample.material])) continue;
       parts_.push_back({first + v, area_m2[v]});
       if (sample.other_side != kNoSample) parts_.push_back({sample.other_side, area_m2[v]});
     }

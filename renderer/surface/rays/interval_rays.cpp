@@ -171,6 +171,15 @@ void IntervalRays::bound_packets() noexcept {
       ball.radius_m = ball.way_m + entity_radius_m_[m];
     }
   }
+  for (std::size_t m = 0; m < entities; ++m) middle_[m] = placed(m, middle_ray_);
+}
+
+bool IntervalRays::stands(std::size_t entity) const noexcept {
+  for (std::size_t packet = 0; packet < kSunRays / kPacketRays; ++packet) {
+    const Reach& ball = reach(entity, packet);
+    if (ball.changes || ball.radius_m < 0.0F) return false;
+  }
+  return true;
 }
 
 void IntervalRays::hold(const glm::dvec3& to_sun) noexcept {

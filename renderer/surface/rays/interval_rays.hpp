@@ -28,6 +28,8 @@ struct HiddenSky {
   /// Share of the rays of hidden_sky() above the horizon that entities block, 0 to 1.
   float frac = 0.0F;
   std::uint32_t entity = 0;
+  /// What the hot parts of entities send, see HotParts, W/m2.
+  float hot_w_m2 = 0.0F;
 };
 
 /// Visible share of the sun's disc, mean over the part of an interval in which the sun stands
@@ -52,6 +54,7 @@ class IntervalRays {
         sky_(sky),
         stands_(entity_radius_m_.size()),
         placements_(entity_radius_m_.size() * kSunRays),
+        middle_(entity_radius_m_.size()),
         reaches_(entity_radius_m_.size() * kSunRays / kPacketRays) {}
 
   /// Computes directions and placements for the interval [begin_ns, end_ns]. `turn` varies the
@@ -125,6 +128,12 @@ class IntervalRays {
   [[nodiscard]] const EntityPlacement& placement(std::size_t entity) const noexcept {
     return placed(entity, middle_ray_);
   }
+  /// Returns the placements of all entities in the middle of the interval.
+  [[nodiscard]] std::span<const EntityPlacement> middle_placements() const noexcept {
+    return middle_;
+  }
+  /// Returns whether an entity is in the scene and stands still over the whole interval.
+  [[nodiscard]] bool stands(std::size_t entity) const noexcept;
   /// Returns the mean stand of an entity over the interval.
   [[nodiscard]] const EntityStand& stand(std::size_t entity) const noexcept {
     return stands_[entity];
@@ -191,6 +200,7 @@ class IntervalRays {
   std::vector<EntityAnchor> anchors_;        ///< by entity, or empty
   std::vector<EntityStand> stands_;          ///< by entity
   std::vector<EntityPlacement> placements_;  ///< by entity, then ray
+  std::vector<EntityPlacement> middle_;      ///< by entity
   std::vector<Reach> reaches_;               ///< by packet, then entity
   std::array<glm::vec3, kSunRays> direction_{};
   /// Largest distance of a direction from the first one of its packet.

@@ -66,6 +66,7 @@ void SurfaceInterval::reset(const SurfaceModel& model, std::vector<EntityAnchor>
   columns_.emplace(model.samples, heat_);
   bands_.emplace(model.samples, lights);
   exitance_ = {};
+  hot_ = {};
   views_ = {};
   faces_.clear();
   bodies_ = BodyNodes(model, geometry_.geometry(), heat_);
@@ -73,6 +74,7 @@ void SurfaceInterval::reset(const SurfaceModel& model, std::vector<EntityAnchor>
   body_mean_k_.assign(bodies_.size(), 0.0);
   if (!exchange) return;
   exitance_ = EntityExitance(model, geometry_.geometry(), geometry_.entity_of_object());
+  hot_ = HotParts(geometry_.geometry(), geometry_.entity_of_object());
   faces_.assign(geometry_.entities(), {});
 }
 

@@ -101,7 +101,7 @@ class SurfaceInterval {
   [[nodiscard]] const HeatInterval& heat_interval() const noexcept { return interval_; }
   /// Input that all steps share in this interval.
   [[nodiscard]] SurfaceStep step(const SurfaceSamples& all) const noexcept {
-    return {all, heat_, geometry_.rays(), faces_, body_mean_k_, views_};
+    return {all, heat_, geometry_.rays(), faces_, hot_, body_mean_k_, views_};
   }
 
  private:
@@ -123,6 +123,7 @@ class SurfaceInterval {
   IntervalRays rays_;
   HeatInterval interval_;
   EntityExitance exitance_;
+  HotParts hot_;
   std::vector<EntityFaces> faces_;  ///< by entity, at the node with which the interval begins
   BodyNodes bodies_;
   std::vector<double> inflow_w_;     ///< by body, at the node with which the interval begins

@@ -137,6 +137,11 @@ SampleDrive drive_of(const SurfaceStep& step, const IntervalRays& interval_rays,
       drive.longwave_begin_w_m2 += sample.sky_frac * hidden.frac * sent_w_m2;
     }
   }
+  if (!step.hot.empty() && sample.entity < 0) {
+    drive.longwave_begin_w_m2 +=
+        step.hot.on_w_m2(step.rays, interval_rays,
+                         sample.position_m + offsets.around_m * sample.normal, sample.normal);
+  }
   // Add the radiation of the samples that it sees.
   struct Radiation {
     double longwave_w_m2 = 0.0;

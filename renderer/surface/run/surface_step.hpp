@@ -10,6 +10,7 @@
 #include "surface/heat/surface_samples.hpp"
 #include "surface/model/entity_exitance.hpp"
 #include "surface/rays/caster_rays.hpp"
+#include "surface/rays/hot_parts.hpp"
 #include "surface/rays/interval_rays.hpp"
 
 namespace emit::renderer {
@@ -25,7 +26,8 @@ struct SurfaceStep {
   const SampleHeat& heat;
   const CasterRays& rays;
   std::span<const EntityFaces> faces;  ///< by entity; if empty, entities send what surroundings do
-  std::span<const double> body_k;      ///< by body: interior, mean over the interval; offsets
+  const HotParts& hot;
+  std::span<const double> body_k;  ///< by body: interior, mean over the interval; offsets
   /// Views by entity of what the warm-up did not see there; empty while no entity has moved.
   std::span<const BodyView> views{};
   /// Takes the equations of columns, whose cells it finds together afterwards. Null: each column

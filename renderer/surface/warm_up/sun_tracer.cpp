@@ -12,6 +12,7 @@ namespace emit::renderer {
 
 SunTracer::SunTracer(const SurfaceInputs& inputs, const SurfaceModelOptions& options)
     : in_(inputs), lateral_(options.lateral), max_blur_m_(static_cast<float>(options.max_blur_m)) {
+  if (options.exchange) hot_ = HotParts(inputs.geometry, inputs.entity_of_object);
   for (const scene::Material& material : inputs.materials) {
     diffusivity_m2_s_.push_back(static_cast<float>(diffusivity_m2_s(material)));
     foot_reach_m_.push_back(foot_reach_m(material));
@@ -38,6 +39,14 @@ void SunTracer::trace(const SurfaceSample& sample, std::span<float> sun_frac,
     sun_frac[i] = rays.sun_frac(in_.rays, sample, offsets.sun_m, blur_m);
     if (!hidden_sky.empty()) {
       hidden_sky[i] = rays.hidden_sky(in_.rays, sample, offsets.around_m);
+      if (!hot_.empty() && sample.entity < 0) {
+        // While they stand they send the same.
+        hidden_sky[i].hot_w_m2 =
+            i > 0 && hot_.same(record.rays[i - 1], rays)
+                ? hidden_sky[i - 1].hot_w_m2
+                : hot_.on_w_m2(in_.rays, rays, sample.position_m + offsets.around_m * sample.normal,
+                               sample.normal);
+      }
     }
     if (!cloud_sun.empty()) cloud_sun[i] = rays.cloud_sun(sample);
   }

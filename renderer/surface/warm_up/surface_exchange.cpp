@@ -519,12 +519,15 @@ SampleDrive Sweeper::drive(std::size_t s, const glm::vec3& normal, const Window&
   if (!rows.cloud_sun.empty()) drive.sun_frac *= rows.cloud_sun[j];
   drive.take_entity(in_.record.intervals[j].entities, sample);
   if (sample.body >= 0) drive.body_k = bodies_->mean_k(sample.body, j);
-  if (!rows.hidden_sky.empty()) drive.hidden_sky_frac = rows.hidden_sky[j].frac;
+  if (!rows.hidden_sky.empty()) {
+    drive.hidden_sky_frac = rows.hidden_sky[j].frac;
+    drive.longwave_begin_w_m2 = drive.longwave_end_w_m2 = rows.hidden_sky[j].hot_w_m2;
+  }
   // Add what the seen samples send, scaled to the share of the hemisphere that they fill.
   const SeenRadiation::Received received = seen_.of(sample);
   if (!received.row_w_m2.empty()) {
-    drive.longwave_begin_w_m2 = received.scale * received.row_w_m2[k];
-    drive.longwave_end_w_m2 = received.scale * received.row_w_m2[k + 1];
+    drive.longwave_begin_w_m2 += received.scale * received.row_w_m2[k];
+    drive.longwave_end_w_m2 += received.scale * received.row_w_m2[k + 1];
     drive.shortwave_w_m2 = received.scale * received.row_w_m2[window.count + 1 + k];
   }
   add_exitance(s, normal, window, k, drive);

@@ -429,7 +429,12 @@ void PatchSampler::integrate(std::span<const NewSample> samples, StartMemo& memo
     if (side.cloud_sun.length() != 0) drive.sun_frac *= side.cloud_sun.row(index)[i];
     drive.longwave_begin_w_m2 = drive.longwave_end_w_m2 = side.held[index].longwave_w_m2;
     drive.take_entity(record.intervals[i].entities, side.samples[index]);
-    if (side.hidden_sky.length() != 0) drive.hidden_sky_frac = side.hidden_sky.row(index)[i].frac;
+    if (side.hidden_sky.length() != 0) {
+      const HiddenSky& hidden = side.hidden_sky.row(index)[i];
+      drive.hidden_sky_frac = hidden.frac;
+      drive.longwave_begin_w_m2 += hidden.hot_w_m2;
+      drive.longwave_end_w_m2 += hidden.hot_w_m2;
+    }
     return drive;
   };
   const auto place_of = [](const NewSample& each) { return std::pair(each.patch, each.index); };

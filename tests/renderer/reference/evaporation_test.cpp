@@ -203,6 +203,92 @@ TEST(ReferenceEvaporation, LawnAtNoonIsNearTheAirAndNotNearItsDryLayers) {
   }
 }
 
+/// Steady temperature of level, insulated ground by the equation of Penman and Monteith with the
+/// formulas of FAO-56 (Allen et al. 1998, eq. 3, 8, 11 and 13), its radiation being that of its own
+/// temperature. Without water it evaporates nothing.
+double penman_monteith_k(double sun_w_m2, double sky_w_m2, double air_k, double humidity_frac,
+                         double film_w_m2_k, double pressure_pa, bool wet, double resistance_s_m) {
+  constexpr double kHeatJ_kg_k = 1013.0;
+  constexpr double kGasJ_kg_k = 287.0;
+  constexpr double kVapourJ_kg = 2.45e6;
+  const double air_c = air_k - 273.15;
+  const double density_kg_m3 = pressure_pa / (kGasJ_kg_k * air_k);
+  const double air_s_m = density_kg_m3 * kHeatJ_kg_k / film_w_m2_k;
+  const auto saturation_pa = [](double c) { return 610.8 * std::exp(17.27 * c / (c + 237.3)); };
+  const double gamma_pa_k = kHeatJ_kg_k * pressure_pa / (0.622 * kVapourJ_kg);
+  double surface_k = air_k;
+  for (int i = 0; i < 200; ++i) {
+    const double net_w_m2 =
+        sun_w_m2 + sky_w_m2 - 0.95 * physics::kStefanBoltzmannWPerM2K4 * std::pow(surface_k, 4.0);
+    // The slope is that between air and surface.
+    const double middle_c = 0.5 * (air_c + surface_k - 273.15);
+    const double slope_pa_k =
+        4098.0 * saturation_pa(middle_c) / ((middle_c + 237.3) * (middle_c + 237.3));
+    const double deficit_pa = (1.0 - humidity_frac) * saturation_pa(air_c);
+    const double latent_w_m2 =
+        wet ? (slope_pa_k * net_w_m2 + density_kg_m3 * kHeatJ_kg_k * deficit_pa / air_s_m) /
+                  (slope_pa_k + gamma_pa_k * (1.0 + resistance_s_m / air_s_m))
+            : 0.0;
+    // Half steps keep the radiation from ringing.
+    surface_k += 0.5 * (air_k + (net_w_m2 - latent_w_m2) / film_w_m2_k - surface_k);
+  }
+  return surface_k;
+}
+
+TEST(ReferenceEvaporation, WetSoilAndLawnAreCoolerThanDrySoilByPenmanAndMonteith) {
+  constexpr double kSunW_m2 = 450.0;
+  constexpr double kSkyW_m2 = 350.0;
+  constexpr double kFilmW_m2_k = 20.0;
+  for (const double air_k : {283.15, 293.15, 303.15}) {
+    for (const double humidity_frac : {0.3, 0.6}) {
+      scene::ScenarioDesc scenario = climate_scenario("temperate_summer");
+      scenario.thermal.history_start_ns = -48 * kHourNs;
+      scenario.thermal.spin_up_ns = 0;
+      for (const std::int64_t t : {-48 * kHourNs, std::int64_t{0}}) {
+        scene::WeatherSample row;
+        row.sim_time_ns = t;
+        row.diffuse_horizontal_w_m2 = kSunW_m2;
+        row.longwave_down_w_m2 = kSkyW_m2;
+        row.air_k = air_k;
+        row.relative_humidity_frac = humidity_frac;
+        row.film_w_m2_k = kFilmW_m2_k;
+        scenario.weather.push_back(row);
+      }
+      scene::Material soil;
+      soil.name = "soil";
+      soil.solar_absorptance_frac = 0.8;
+      soil.emissivity_frac = 0.95;
+      soil.layers = {{0.5, 0.02, 30.0, 1000.0}};
+      soil.base_k = air_k;
+      std::vector<std::int64_t> nodes_ns;
+      for (std::int64_t t = -48 * kHourNs; t <= 0; t += 30 * kMinuteNs) nodes_ns.push_back(t);
+      const auto climate = reference::SurfaceClimate::create(scenario, {});
+      ASSERT_TRUE(climate.has_value()) << climate.error().text;
+      const auto forcing = renderer::surface_forcing(scenario, nodes_ns);
+      ASSERT_TRUE(forcing.has_value());
+      const double pressure_pa =
+          101'325.0 * std::pow(1.0 - 2.25577e-5 * scenario.place.height_m, 5.2559);
+      const auto expected_k = [&](bool wet, double resistance_s_m) {
+        return penman_monteith_k(0.8 * kSunW_m2, 0.95 * kSkyW_m2, air_k, humidity_frac, kFilmW_m2_k,
+                                 pressure_pa, wet, resistance_s_m);
+      };
+      const Courses dry = courses_of(scenario, soil, *climate, nodes_ns, *forcing);
+      for (const double resistance_s_m : {0.0, 70.0}) {
+        scene::Material moist = soil;
+        moist.wetness_frac = 1.0;
+        moist.surface_resistance_s_m = moist.night_resistance_s_m = resistance_s_m;
+        const Courses wet = courses_of(scenario, moist, *climate, nodes_ns, *forcing);
+        const double cooler_k = expected_k(false, 0.0) - expected_k(true, resistance_s_m);
+        SCOPED_TRACE(testing::Message() << air_k << " K, humidity " << humidity_frac << ", "
+                                        << resistance_s_m << " s/m");
+        EXPECT_GT(cooler_k, 4.0);
+        EXPECT_NEAR(dry.model_k.back() - wet.model_k.back(), cooler_k, 0.05 * cooler_k);
+        EXPECT_NEAR(dry.truth_k.back() - wet.truth_k.back(), cooler_k, 0.05 * cooler_k);
+      }
+    }
+  }
+}
+
 /// Temperate summer as a table, with a shower of half an hour at the start of the day's frames.
 scene::ScenarioDesc shower(double rain_mm_h) {
   scene::ScenarioDesc scenario = climate_scenario("temperate_summer");

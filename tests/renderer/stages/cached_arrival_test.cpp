@@ -69,12 +69,14 @@ void stays(scene::ScenarioDesc& s, const glm::dvec3& at_m) {
   s.objects.back().instances = {stands_at(s, at_m)};
 }
 
-/// Mean temperature of the pixels in the middle of an image from a place at the end of the time.
-double seen_k(const scene::ScenarioDesc& s, const glm::dvec3& from_m, const glm::dvec3& at_m) {
+/// Mean temperature of the pixels in the middle of an image from a place at the end of the time,
+/// after frames from an instant on.
+double seen_k(const scene::ScenarioDesc& s, const glm::dvec3& from_m, const glm::dvec3& at_m,
+              std::int64_t from_ns = kMoveNs - kSecondNs) {
   Session run(s);
   const physics::Pose eye = looking(from_m, at_m);
   std::vector<float> frame;
-  for (std::int64_t now_ns = kMoveNs - kSecondNs; now_ns < kShownNs; now_ns += 5 * kSecondNs) {
+  for (std::int64_t now_ns = from_ns; now_ns < kShownNs; now_ns += 5 * kSecondNs) {
     frame = run.frame_k(now_ns, eye);
   }
   double sum_k = 0.0;
@@ -150,6 +152,42 @@ TEST(RendererCachedArrival, AHotWallInManyPiecesWarmsTheGroundAsOneInOnePieceDoe
     return seen_k(s, {-0.5, 0.0, 2.0}, {0.5, 0.0, 0.0});
   };
   EXPECT_NEAR(beside_wall_k(30), beside_wall_k(1), 0.1);
+}
+
+TEST(RendererCachedArrival, AHotPartOfAnEntityWarmsTheGroundAsSceneryDoes) {
+  // A plate of 1 m x 1 m at 800 K hangs 1.5 m over the ground, in one piece or in many.
+  const auto ground_k = [](bool entity, int pieces, double away_m) {
+    scene::ScenarioDesc s = night();
+    scene::Material hot = s.materials[0];
+    hot.name = "plate";
+    hot.prescribed_k = 800.0;
+    s.materials.push_back(hot);
+    std::vector<Quad> quads;
+    const double side_m = 1.0 / pieces;
+    for (int i = 0; i < pieces * pieces; ++i) {
+      const double x = -0.5 + side_m * (i % pieces);
+      const double y = -0.5 + side_m * (i / pieces);
+      quads.push_back(
+          {{x, y, 1.5}, {x, y + side_m, 1.5}, {x + side_m, y + side_m, 1.5}, {x + side_m, y, 1.5}});
+    }
+    scene::ObjectDesc plate = s.objects.front();
+    plate.name = plate.material = "plate";
+    plate.gltf = write_quads("plate" + std::to_string(pieces), quads);
+    if (entity) {
+      plate.entity_id = 7;
+      plate.instances = {stands_at(s, {0.0, 0.0, 0.0})};
+    }
+    s.objects.push_back(plate);
+    return seen_k(s, {away_m - 1.0, -1.5, 1.0}, {away_m, 0.02, 0.0}, kShownNs - kSecondNs);
+  };
+  const double cold_k = ground_k(false, 1, 28.0);
+  for (const double away_m : {0.05, 1.2, 3.0, 5.0, 7.0}) {
+    SCOPED_TRACE(away_m);
+    const double scenery_k = ground_k(false, 1, away_m);
+    EXPECT_GT(scenery_k, cold_k + (away_m < 4.0 ? 1.0 : 0.05));
+    EXPECT_NEAR(ground_k(true, 1, away_m), scenery_k, 0.1 + 0.03 * (scenery_k - cold_k));
+    EXPECT_NEAR(ground_k(true, 9, away_m), scenery_k, 0.1 + 0.03 * (scenery_k - cold_k));
+  }
 }
 
 TEST(RendererCachedArrival, AHotBodyThatComesWarmsOneThatStandsThere) {
