@@ -148,10 +148,9 @@ float HotParts::far_w_m2(const Part& part, const EntityPlacement& place, const C
     passed_m2 += projected_m2(face);
     while (count < kShadowRays &&
            passed_m2 > (static_cast<float>(count) + 0.5F) / kShadowRays * area_m2) {
-      places_m[count++] =
-          place.rel_from_body *
-              ((face.corners_m[0] + face.corners_m[1] + face.corners_m[2]) / 3.0F) +
-          place.position_m;
+      places_m[count++] = place.rel_from_body *
+                              ((face.corners_m[0] + face.corners_m[1] + face.corners_m[2]) / 3.0F) +
+                          place.position_m;
     }
   }
   if (count == 0) return 0.0F;

@@ -28,7 +28,7 @@ struct HiddenSky {
   /// Share of the rays of hidden_sky() above the horizon that entities block, 0 to 1.
   float frac = 0.0F;
   std::uint32_t entity = 0;
-  /// What the hot parts of entities send, see HotParts, W/m2.
+  /// Irradiance that comes from the hot parts of entities (HotParts), W/m2.
   float hot_w_m2 = 0.0F;
 };
 

@@ -40,7 +40,7 @@ void SunTracer::trace(const SurfaceSample& sample, std::span<float> sun_frac,
     if (!hidden_sky.empty()) {
       hidden_sky[i] = rays.hidden_sky(in_.rays, sample, offsets.around_m);
       if (!hot_.empty() && sample.entity < 0) {
-        // While they stand they send the same.
+        // Parts of entities that stand send the same as in the interval before.
         hidden_sky[i].hot_w_m2 =
             i > 0 && hot_.same(record.rays[i - 1], rays)
                 ? hidden_sky[i - 1].hot_w_m2
