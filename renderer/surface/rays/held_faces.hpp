@@ -21,7 +21,7 @@ namespace emit::renderer {
 class HeldFaces {
  public:
   /// Largest number of faces that are treated so. With more there is none here, and rays find them.
-  static constexpr std::size_t kMost = 64;
+  static constexpr std::size_t kMost = 256;
 
   /// Collects the faces. `entity_of_object` and `origin_world_m` are those of the rays.
   HeldFaces(const scene::SceneGeometry& geometry, std::span<const scene::Material> materials,

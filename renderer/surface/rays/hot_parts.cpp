@@ -24,13 +24,17 @@ constexpr float kFarRadii = 8.0F;
 constexpr std::size_t kShadowRays = 4;
 /// Share of the way to a face in which something must stand to hide it.
 constexpr float kBeforeFaceFrac = 0.995F;
+/// Distance before a face in which nothing hides it, in radii of its part.
+constexpr float kSlackRadii = 0.3F;
 /// Least distance in the bound of what a part can send.
 constexpr float kNearestM = 0.02F;
 const float kPiF = static_cast<float>(physics::kPi);
 
-/// Returns the share of places that nothing hides from a start.
+/// Returns the share of places that nothing hides from a start. What stands within `slack_m` before
+/// a place hides nothing: bodies that cast shade may be coarser than their faces.
 float visible_frac(const CasterRays& rays, const CasterSelection& selection,
-                   const glm::vec3& start_m, std::span<const glm::vec3> places_m) noexcept {
+                   const glm::vec3& start_m, std::span<const glm::vec3> places_m,
+                   float slack_m) noexcept {
   std::array<CasterRay, kShadowRays> sent;
   std::array<CasterHit, kShadowRays> hits;
   std::array<float, kShadowRays> way_m{};
@@ -45,7 +49,8 @@ float visible_frac(const CasterRays& rays, const CasterSelection& selection,
       rays.first_hits(std::span(sent).first(places_m.size()), selection, hits, farthest_m);
   std::size_t visible = 0;
   for (std::size_t k = 0; k < places_m.size(); ++k) {
-    const bool hidden = ((met >> k) & 1U) != 0U && hits[k].distance_m < kBeforeFaceFrac * way_m[k];
+    const bool hidden =
+        ((met >> k) & 1U) != 0U && hits[k].distance_m < kBeforeFaceFrac * way_m[k] - slack_m;
     if (!hidden) ++visible;
   }
   return static_cast<float>(visible) / static_cast<float>(places_m.size());
@@ -154,7 +159,8 @@ float HotParts::far_w_m2(const Part& part, const EntityPlacement& place, const C
     }
   }
   if (count == 0) return 0.0F;
-  return open_w_m2 * visible_frac(rays, selection, start_m, std::span(places_m).first(count));
+  return open_w_m2 * visible_frac(rays, selection, start_m, std::span(places_m).first(count),
+                                  kSlackRadii * part.radius_m);
 }
 
 float HotParts::near_w_m2(const Part& part, const EntityPlacement& place, const CasterRays& rays,
@@ -178,7 +184,7 @@ float HotParts::near_w_m2(const Part& part, const EntityPlacement& place, const 
                                                       0.5F * (middle_m + at_m[1]),
                                                       0.5F * (middle_m + at_m[2])};
     sum_w_m2 += part.sent_w_m2 * static_cast<float>(frac) *
-                visible_frac(rays, selection, start_m, places_m);
+                visible_frac(rays, selection, start_m, places_m, kSlackRadii * part.radius_m);
   }
   return sum_w_m2;
 }

@@ -46,7 +46,7 @@ class SeenList {
   [[nodiscard]] std::span<const SeenSample> list() const noexcept { return {list_.data(), count_}; }
 
  private:
-  static constexpr unsigned kBits = 10;
+  static constexpr unsigned kBits = 11;
   static constexpr std::uint16_t kFree = 0xffff;
   static_assert(2 * kMaxListed < (std::size_t{1} << kBits));
   std::array<std::uint16_t, std::size_t{1} << kBits> slots_{};
