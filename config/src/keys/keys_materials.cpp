@@ -259,7 +259,7 @@ const KeyTable<Material>& material_keys() {
                        EMIT_FIELD(roughness),
                        "foster: roughness for the wind: gravel and crops are very_rough, brick "
                        "rough, concrete medium_rough, fabric medium_smooth, painted metal smooth, "
-                       "glass very_smooth, ponds and the sea open_water."),
+                       "glass very_smooth, water open_water."),
       written_if([](const Material& in) { return !in.layers.empty(); },
                  choice<Material>(
                      "base",
