@@ -69,7 +69,7 @@ std::vector<std::string> weather_limits(const scene::ScenarioDesc& scenario,
   if (dark != nullptr) {
     out.push_back(fmt::format(
         "longwave_low: the weather's long-wave irradiance is {:.0f} W/m2 at {} s, below {} of a "
-        "black sky's at {:.1f} K: a gap in it?",
+        "black sky's at {:.1f} K: it may be a gap",
         dark->longwave_down_w_m2, static_cast<double>(dark->time_ns) * 1e-9, kLeastSkyFrac,
         dark->air_k));
   }

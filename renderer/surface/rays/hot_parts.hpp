@@ -15,10 +15,10 @@ namespace emit::renderer {
 
 /// Parts of entities with a prescribed temperature of 380 K and more, as surfaces that stand still
 /// see them. They are small and far hotter than the rest, so that a mean over the faces of their
-/// entity loses them.
-/// Near by, each face counts by Lambert's form factor; from eight radii of the part on, by its
-/// projected area. Four shadow rays a face, or four for the part, find what is visible. A part
-/// counts while its entity stands still. Immutable; any thread.
+/// entity loses them. Near by, each face counts by Lambert's form factor; from eight radii of the
+/// part on, by its projected area. Four shadow rays a face, or four for the part, find what is
+/// visible. A part counts while its entity stands still; parts that host or script heat are not
+/// among these, and stay in the mean. Immutable; any thread.
 class HotParts {
  public:
   HotParts() = default;

@@ -268,7 +268,7 @@ std::vector<GroundSign> fit_signs(const LoggerRecord& record, const MeasuredGrou
     }
   }
   // Below this the correlation of the residuals is itself hardly known, and intervals that should
-  // hold in 99 of 100 records held in about 90.
+  // hold in 99 of 100 records held in 79 of 90.
   constexpr double kFewRows = 12.0;
   if (!fit.estimates.empty() && fit.independent_rows < kFewRows) {
     signs.push_back({"fit",

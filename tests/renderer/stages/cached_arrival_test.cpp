@@ -156,7 +156,7 @@ TEST(RendererCachedArrival, AHotWallInManyPiecesWarmsTheGroundAsOneInOnePieceDoe
 
 TEST(RendererCachedArrival, AHotPartOfAnEntityWarmsTheGroundAsSceneryDoes) {
   // A plate of 1 m x 1 m at 800 K hangs 1.5 m over the ground, in one piece or in many.
-  const auto ground_k = [](bool entity, int pieces, double away_m) {
+  const auto ground_k = [](bool entity, int pieces, double away_m, std::int64_t live_s = 1) {
     scene::ScenarioDesc s = night();
     scene::Material hot = s.materials[0];
     hot.name = "plate";
@@ -178,7 +178,7 @@ TEST(RendererCachedArrival, AHotPartOfAnEntityWarmsTheGroundAsSceneryDoes) {
       plate.instances = {stands_at(s, {0.0, 0.0, 0.0})};
     }
     s.objects.push_back(plate);
-    return seen_k(s, {away_m - 1.0, -1.5, 1.0}, {away_m, 0.02, 0.0}, kShownNs - kSecondNs);
+    return seen_k(s, {away_m - 1.0, -1.5, 1.0}, {away_m, 0.02, 0.0}, kShownNs - live_s * kSecondNs);
   };
   const double cold_k = ground_k(false, 1, 28.0);
   for (const double away_m : {0.05, 1.2, 3.0, 5.0, 7.0}) {
@@ -188,6 +188,10 @@ TEST(RendererCachedArrival, AHotPartOfAnEntityWarmsTheGroundAsSceneryDoes) {
     EXPECT_NEAR(ground_k(true, 1, away_m), scenery_k, 0.1 + 0.03 * (scenery_k - cold_k));
     EXPECT_NEAR(ground_k(true, 9, away_m), scenery_k, 0.1 + 0.03 * (scenery_k - cold_k));
   }
+  // Live steps carry on what the warm-up began.
+  constexpr double kAwayM = 1.2;
+  const double warm_k = ground_k(false, 1, kAwayM);
+  EXPECT_NEAR(ground_k(true, 1, kAwayM, 1200), warm_k, 0.1 + 0.03 * (warm_k - cold_k));
 }
 
 TEST(RendererCachedArrival, AHotBodyThatComesWarmsOneThatStandsThere) {

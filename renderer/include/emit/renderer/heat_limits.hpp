@@ -52,7 +52,7 @@ inline void add(HeatLimits& limits, HeatLimit which) noexcept {
       "snow or ice is above 0 C: melting takes no heat here, so that it is too warm",
       "the weather lacks the humidity that moist ground needs: 60 % at the mean air counts",
       "the wind is above 20 m/s, beyond the measurements of the air film",
-      "the weather's long-wave irradiance is below 0.4 of a black sky's: a gap in it?"};
+      "the weather's long-wave irradiance is below 0.4 of a black sky's: it may be a gap"};
   return kTexts[static_cast<std::size_t>(which)];
 }
 

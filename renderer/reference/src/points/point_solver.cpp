@@ -44,10 +44,15 @@ BaseSample mix(const BaseSample& a, const BaseSample& b, double f) noexcept {
   return {a.time_ns, a.kelvin + f * (b.kelvin - a.kelvin)};
 }
 
-/// Interpolates a motion.
+/// Interpolates a motion. A face that has turned over between two samples has no normal in the
+/// middle, and keeps the nearer one.
 MotionSample mix(const MotionSample& a, const MotionSample& b, double f) noexcept {
+  constexpr double kShortest = 1e-6;
+  const glm::dvec3 between = a.normal + f * (b.normal - a.normal);
+  const double length = glm::length(between);
   return {a.time_ns, a.velocity_m_s + f * (b.velocity_m_s - a.velocity_m_s),
-          a.up_m + f * (b.up_m - a.up_m), glm::normalize(a.normal + f * (b.normal - a.normal))};
+          a.up_m + f * (b.up_m - a.up_m),
+          length > kShortest ? between / length : (f < 0.5 ? a.normal : b.normal)};
 }
 
 /// Moves `row` on to the last row at or before `now_ns`. At a jump this is the later one.
