@@ -421,7 +421,8 @@ Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
   complete_history(thermal, scenario.thermal);
   resolve_weather(root, scenario, diagnostics);
   resolve_clouds(root, scenario, diagnostics);
-  if (!thermal.has("initial_k")) scenario.thermal.initial_k = scene::mean_air_k(scenario);
+  scenario.thermal.initial_stated = thermal.has("initial_k");
+  if (!scenario.thermal.initial_stated) scenario.thermal.initial_k = scene::mean_air_k(scenario);
   resolve_display(root, scenario, diagnostics);
 
   const std::vector<scene::SpectralBand> declared = resolve_declared_bands(root, diagnostics);

@@ -13,6 +13,7 @@
 
 #include "emit/physics/check.hpp"
 #include "emit/physics/step_nodes.hpp"
+#include "emit/scene/base.hpp"
 #include "emit/scene/melting.hpp"
 #include "emit/threads/parallel.hpp"
 
@@ -28,6 +29,9 @@ using physics::FosterState;
 constexpr std::size_t kSpinUpSteps = 288;
 constexpr double kFirstSpinUpStepS = 300.0;
 constexpr double kFirstTailStepS = 300.0;
+// The day whose balance surfaces begin in has steps of half an hour.
+constexpr std::size_t kDaySteps = 48;
+constexpr std::int64_t kDayStepNs = scene::kBalancedDayNs / static_cast<std::int64_t>(kDaySteps);
 // Tolerance of the surroundings' temperature, K.
 constexpr double kSurroundingsToleranceK = 0.01;
 /// Thermal resistance behind the middle of a sheet, m2 K/W: a difference of 50 K gives 0.05 W/m2.
@@ -183,6 +187,8 @@ physics::Result<std::vector<FosterMaterial>> foster_materials(
     entry.snow_or_ice = scene::is_snow_or_ice(material);
     entry.base_k = material.base_k;
     entry.initial_k = material.initial_k.value_or(options.initial_k);
+    entry.starts_balanced = scene::starts_balanced(options) && !material.initial_k &&
+                            !material.prescribed_k && !material.sheet;
     if (material.prescribed_k) {
       entry.prescribed_k = *material.prescribed_k;
       out.push_back(entry);
@@ -258,6 +264,11 @@ FosterHistory::FosterHistory(const scene::ScenarioDesc& scenario,
     grid_nodes_ = kGridNodes;
     spin_up_.resize(kSpinUpSteps);
   }
+  if (balances()) {
+    grid_nodes_ = kGridNodes;
+    day_.resize(kDaySteps);
+    openings_.resize(materials_.size() + 1);
+  }
   nodes_ns_.resize(kSpinUpSteps + 1);
   table_.resize(materials_.size() * grid_nodes_ * grid_nodes_);
   spin_up_gains_.resize(materials_.size());
@@ -323,12 +334,43 @@ void FosterHistory::forcing_over(std::span<const std::int64_t> nodes_ns,
   }
 }
 
+bool FosterHistory::balances() const noexcept {
+  return surroundings_.starts_balanced ||
+         std::ranges::any_of(materials_, &FosterMaterial::starts_balanced);
+}
+
+void FosterHistory::take_day(const Environment& environment) noexcept {
+  const std::int64_t begin_ns = history_start_ns_ - spin_up_ns_;
+  const auto carry_day = [&](const FosterState<double>& surroundings) {
+    ground_ = {};
+    grounds_.start(ground_);
+    follow_ = true;
+    ground_.surroundings = surroundings;
+    const auto node_ns = [&](std::size_t i) {
+      return begin_ns + static_cast<std::int64_t>(i) * kDayStepNs;
+    };
+    for (std::size_t i = 0; i < kDaySteps; ++i) {
+      carry(interval_between(node_ns(i), node_ns(i + 1), environment), tolerance_k_, day_[i]);
+    }
+  };
+  // What the surroundings send does not reach themselves, so that their own day comes first.
+  carry_day(surroundings_start_);
+  if (!surroundings_.starts_balanced) return;
+  const std::size_t last = materials_.size();
+  openings_.fill(last, surroundings_, day_, {}, reference_k_);
+  const glm::dvec3 up(0.0, 0.0, 1.0);
+  surroundings_start_ = openings_.at_start(last, 1.0, mean_sun_w_m2(day_, up), 1.0);
+  carry_day(surroundings_start_);
+}
+
 void FosterHistory::spin_up_surroundings(const Environment& environment) noexcept {
+  surroundings_start_ =
+      surroundings_.prescribed() ? FosterState<double>{} : foster_initial_states(surroundings_);
+  if (!day_.empty()) take_day(environment);
   ground_ = {};
   grounds_.start(ground_);
   follow_ = true;
-  ground_.surroundings =
-      surroundings_.prescribed() ? FosterState<double>{} : foster_initial_states(surroundings_);
+  ground_.surroundings = surroundings_start_;
   const std::int64_t table_ns =
       history_start_ns_ - std::min(spin_up_ns_, tail_.empty() ? 0 : kTailNs);
   if (!spin_up_.empty()) {
@@ -371,6 +413,26 @@ FosterState<double> FosterHistory::start_states(std::size_t material,
   return x;
 }
 
+FosterState<double> FosterHistory::first_states(std::size_t material,
+                                                const glm::dvec3& normal) const noexcept {
+  if (!materials_[material].starts_balanced) return foster_initial_states(materials_[material]);
+  return openings_.at_start(material, normal.z, mean_sun_w_m2(day_, normal),
+                            FaceOpening::unshadowed(normal).sky_frac);
+}
+
+FosterState<double> FosterHistory::hidden_states(std::size_t material,
+                                                 const FaceOpening& face) const noexcept {
+  EMIT_DCHECK_OP(material, <, materials_.size());
+  if (!materials_[material].starts_balanced) return {};
+  const double open_w_m2 = mean_sun_w_m2(day_, face.normal);
+  const FosterState<double> open = openings_.later(material, face.normal.z, open_w_m2,
+                                                   FaceOpening::unshadowed(face.normal).sky_frac);
+  FosterState<double> out =
+      openings_.later(material, face.normal.z, face.sun_frac * open_w_m2, face.sky_frac);
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] -= open[i];
+  return out;
+}
+
 IntervalForcing FosterHistory::extend(std::int64_t begin_ns, std::int64_t end_ns,
                                       const Environment& environment) noexcept {
   IntervalForcing out;
@@ -382,7 +444,7 @@ FosterState<double> FosterHistory::spun_up(std::size_t index,
                                            const glm::dvec3& normal) const noexcept {
   EMIT_DCHECK_OP(index, <, materials_.size());
   const FosterMaterial& material = materials_[index];
-  FosterState<double> x = foster_initial_states(material);
+  FosterState<double> x = first_states(index, normal);
   if (spin_up_.empty()) return x;
   const auto surface = foster_surface_of(material, reference_k_);
   for (std::size_t i = 0; i < spin_up_.size(); ++i) {
@@ -408,6 +470,12 @@ void FosterHistory::spin_up(const Environment& environment, const Loop& each) {
     for (std::size_t i = 0; i < spin_up_.size(); ++i) {
       gains[i] = physics::foster_gains(spin_up_[i].dt_s, material.network);
     }
+  }
+  if (!day_.empty()) {
+    each(materials_.size(), [this](std::size_t m) {
+      if (!materials_[m].starts_balanced) return;
+      openings_.fill(m, materials_[m], day_, spin_up_, reference_k_);
+    });
   }
   // Fill the table row by row.
   each(materials_.size() * grid_nodes_, [this](std::size_t row) {

@@ -15,6 +15,7 @@
 #include "history/environment.hpp"
 #include "history/ground_state.hpp"
 #include "history/open_grounds.hpp"
+#include "history/opening_states.hpp"
 #include "history/step_plan.hpp"
 
 /// CPU part of the extended thermal model (`thermal.model = "foster"`): the temperature of the
@@ -107,6 +108,13 @@ class FosterHistory {
   [[nodiscard]] physics::FosterState<double> start_states(std::size_t material,
                                                           const glm::dvec3& normal) const noexcept;
 
+  /// Returns by how much the states of a face differ from those of an unshadowed one at the instant
+  /// of the table, because less sun and sky have reached it all the time. They are 0 for a material
+  /// that has a stated temperature at the start. Thread: any. RT-safe.
+  /// @pre material < materials().size()
+  [[nodiscard]] physics::FosterState<double> hidden_states(std::size_t material,
+                                                           const FaceOpening& face) const noexcept;
+
   /// Advances the surroundings over an interval that follows the last one and returns its forcing.
   /// RT-safe.
   [[nodiscard]] IntervalForcing extend(std::int64_t begin_ns, std::int64_t end_ns,
@@ -134,6 +142,13 @@ class FosterHistory {
   template <class Loop>
   void spin_up(const Environment& environment, const Loop& each);
   void spin_up_surroundings(const Environment& environment) noexcept;
+  /// Returns whether anything begins in the balance of its first day.
+  [[nodiscard]] bool balances() const noexcept;
+  /// Finds the forcing of the first day, and the states of the surroundings at its start.
+  void take_day(const Environment& environment) noexcept;
+  /// Returns the states of an unshadowed face at the start of the spin-up, or of the history.
+  [[nodiscard]] physics::FosterState<double> first_states(std::size_t material,
+                                                          const glm::dvec3& normal) const noexcept;
   /// Advances the surroundings over one interval and writes its forcing.
   void carry(const HistoryInterval& interval, double tolerance_k, IntervalForcing& out) noexcept;
   [[nodiscard]] SurfaceForcing forcing(const physics::SunPosition& sun,
@@ -155,7 +170,10 @@ class FosterHistory {
   bool follow_ = true;  ///< carry() advances the grounds
   double surroundings_now_k_ = 0.0;
 
-  std::vector<IntervalForcing> spin_up_;  ///< intervals up to the instant of the table
+  std::vector<IntervalForcing> day_;  ///< first day; empty where nothing begins in its balance
+  OpeningStates openings_;  ///< by material, then those of the surroundings; sized like day_
+  physics::FosterState<double> surroundings_start_{};  ///< at the start of the spin-up
+  std::vector<IntervalForcing> spin_up_;               ///< intervals up to the instant of the table
   /// Gains of these intervals, by material.
   std::vector<std::vector<physics::FosterGains<double>>> spin_up_gains_;
   std::vector<IntervalForcing> tail_;

@@ -57,6 +57,12 @@ class SurfaceHistory {
   /// @pre material is an index into the scene's materials
   [[nodiscard]] physics::FosterState<double> start_states(std::size_t material,
                                                           const glm::dvec3& normal) const noexcept;
+  /// Returns by how much less sun and sky have changed them (FosterHistory::hidden_states()). With
+  /// emit2014 it is 0.
+  [[nodiscard]] physics::FosterState<double> hidden_states(std::size_t material,
+                                                           const FaceOpening& face) const noexcept {
+    return foster_ ? foster_->hidden_states(material, face) : physics::FosterState<double>{};
+  }
 
  private:
   std::optional<FosterHistory> foster_;

@@ -161,6 +161,14 @@ Result<SceneSolver> SceneSolver::create(const scene::ScenarioDesc& scenario,
     data->bands.push_back(std::move(*made));
   }
   if (three) {
+    // Begin each material at the mean of an open, level face in its balance.
+    for (scene::Material& material : data->geometry.materials) {
+      if (data->climate->stated_start_k(material, 0.0)) continue;
+      const auto mesh = material_mesh(material);
+      if (!mesh) return tl::unexpected(mesh.error());
+      material.initial_k = PointSolver(*data->climate, *mesh, material, scenario.thermal.initial_k)
+                               .balanced_mean_k({0.0, 0.0, 1.0});
+    }
     data->start.emplace(data->rays->at(scenario.thermal.history_start_ns));
     auto solid = SolidHistory::create(data->scenario, data->geometry, *data->start, *data->climate,
                                       data->options, static_cast<double>(end_ns) * 1e-9);

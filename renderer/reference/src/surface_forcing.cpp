@@ -201,6 +201,14 @@ ClimateNode SurfaceClimate::at(std::int64_t time_ns) const noexcept {
           mix(a.wet_frac, b.wet_frac)};
 }
 
+std::optional<double> SurfaceClimate::stated_start_k(const scene::Material& material,
+                                                     double initial_k) const noexcept {
+  if (starts_balanced_ && !material.initial_k && !material.prescribed_k && !material.sheet) {
+    return std::nullopt;
+  }
+  return material.initial_k.value_or(initial_k);
+}
+
 double SurfaceClimate::cloud_sun(const ClimateNode& now, const glm::dvec3& point_m) const noexcept {
   if (clouds_ == nullptr) return 1.0;
   return clouds_->by_mean(point_m, glm::normalize(now.to_sun), now.direct_normal_w_m2, now.time_ns);
@@ -212,6 +220,9 @@ Result<SurfaceClimate> SurfaceClimate::create(const scene::ScenarioDesc& scenari
   if (scenario.clouds) climate.clouds_ = std::make_shared<const CloudSun>(scenario);
   climate.history_start_ns_ = scenario.thermal.history_start_ns;
   const std::int64_t spin_up_ns = options.spin_up_ns.value_or(scenario.thermal.spin_up_ns);
+  scene::ThermalOptions start = scenario.thermal;
+  start.spin_up_ns = spin_up_ns;
+  climate.starts_balanced_ = scene::starts_balanced(start);
   const std::int64_t start_ns = climate.history_start_ns_ - std::max<std::int64_t>(0, spin_up_ns);
   const std::int64_t end_ns = std::max(options.end_ns, climate.history_start_ns_);
   const double step_ns = options.step_s * static_cast<double>(kNsPerS);
@@ -258,7 +269,12 @@ Result<SurfaceClimate> SurfaceClimate::create(const scene::ScenarioDesc& scenari
       ground->prescribed_k ? Result<LayerMesh>(LayerMesh()) : material_mesh(*ground, options.mesh);
   if (!mesh) return tl::unexpected(std::move(mesh.error()));
   std::vector<double> ground_k(climate.nodes_.size(), ground->prescribed_k.value_or(0.0));
-  const double initial_k = ground->initial_k.value_or(scenario.thermal.initial_k);
+  double initial_k = ground->initial_k.value_or(scenario.thermal.initial_k);
+  if (!climate.stated_start_k(*ground, initial_k)) {
+    // What the surroundings send does not reach themselves: they may be balanced without it.
+    initial_k = PointSolver(climate, *mesh, *ground, initial_k, options.steps)
+                    .balanced_mean_k({0.0, 0.0, 1.0});
+  }
   const WaterCourse water = ground->prescribed_k
                                 ? WaterCourse{}
                                 : water_course(climate.nodes_, *ground, initial_k,

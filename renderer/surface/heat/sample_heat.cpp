@@ -15,9 +15,9 @@ void SampleHeat::prepare(HeatInterval& interval) const noexcept {
   std::visit([&](const auto& model) { model.prepare(interval); }, model_);
 }
 
-SampleState SampleHeat::start_state(const SurfaceSample& sample, const glm::vec3& normal,
-                                    const SurfaceHistory& history,
-                                    std::span<const HeatInterval> tail) const noexcept {
+SampleState SampleHeat::open_start(const SurfaceSample& sample, const glm::vec3& normal,
+                                   const SurfaceHistory& history,
+                                   std::span<const HeatInterval> tail) const noexcept {
   // Start emit2014 from the temperature of the material alone: it has no spin-up.
   const auto* extended = std::get_if<FosterHeat>(&model_);
   if (extended == nullptr) return std::get_if<Emit2014Heat>(&model_)->start_state(sample);
@@ -34,6 +34,16 @@ SampleState SampleHeat::start_state(const SurfaceSample& sample, const glm::vec3
     state.modes_k[i] = 0.5 * (state.modes_k[i] + back.modes_k[i]);
   }
   return state;
+}
+
+void SampleHeat::hide_start(const SurfaceSample& sample, const glm::vec3& normal,
+                            const SurfaceHistory& history, double sun_frac,
+                            SampleState& state) const noexcept {
+  const auto* extended = std::get_if<FosterHeat>(&model_);
+  if (extended == nullptr || extended->is_sheet(sample.material)) return;
+  const FaceOpening face{glm::dvec3(normal), sun_frac, static_cast<double>(sample.sky_frac)};
+  const physics::FosterState<double> hidden = history.hidden_states(sample.material, face);
+  for (std::size_t i = 0; i < hidden.size(); ++i) state.modes_k[i] += hidden[i];
 }
 
 SampleOutput SampleHeat::advance(const SurfaceSample& sample, const glm::vec3& normal,

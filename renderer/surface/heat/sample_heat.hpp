@@ -29,10 +29,15 @@ class SampleHeat {
 
   /// Returns the state of a sample at the start of the record. `normal` is in world axes at that
   /// time. `tail` has the last intervals of the unshadowed spin-up, which only foster uses. A sheet
-  /// starts with the mean of its two faces.
-  [[nodiscard]] SampleState start_state(const SurfaceSample& sample, const glm::vec3& normal,
-                                        const SurfaceHistory& history,
-                                        std::span<const HeatInterval> tail) const noexcept;
+  /// starts with the mean of its two faces. Nothing hides sun or sky from it.
+  [[nodiscard]] SampleState open_start(const SurfaceSample& sample, const glm::vec3& normal,
+                                       const SurfaceHistory& history,
+                                       std::span<const HeatInterval> tail) const noexcept;
+  /// Adds to the state of open_start() what the sample has missed of sun and sky before the record.
+  /// `sun_frac` is the share of the sun that has reached it.
+  void hide_start(const SurfaceSample& sample, const glm::vec3& normal,
+                  const SurfaceHistory& history, double sun_frac,
+                  SampleState& state) const noexcept;
 
   /// Advances a sample over an interval and returns its output at the end. `normal` is in world
   /// axes, in the middle of the interval. `back` is given for a sheet: the mean of the inputs of

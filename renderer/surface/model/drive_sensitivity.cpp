@@ -10,7 +10,7 @@ DriveSensitivity::DriveSensitivity(const SurfaceInputs& inputs) : intervals_(inp
   // Integrate the whole record with one share of the sun in `interval` and half of the sun in all
   // others. An `interval` past the end changes none.
   const auto offset_k = [&](const SurfaceSample& sample, std::size_t interval, float sun_frac) {
-    SampleState state = inputs.heat.start_state(sample, sample.normal, inputs.history, record.tail);
+    SampleState state = inputs.heat.open_start(sample, sample.normal, inputs.history, record.tail);
     SampleOutput output;
     for (std::size_t k = 0; k < intervals_; ++k) {
       SampleDrive drive;

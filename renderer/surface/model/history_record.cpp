@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "surface/model/history_record.hpp"
 
+#include <algorithm>
+#include <glm/geometric.hpp>
+
 #include "emit/physics/check.hpp"
 
 namespace emit::renderer {
@@ -31,6 +34,24 @@ void append(HistoryRecord& record, const HistoryInterval& interval, const Interv
 }
 
 }  // namespace
+
+double sun_share(const HistoryRecord& record, const SurfaceSample& sample,
+                 std::span<const float> sun_frac) noexcept {
+  EMIT_DCHECK_OP(sun_frac.size(), ==, record.size());
+  double all_j_m2 = 0.0;
+  double reached_j_m2 = 0.0;
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    if (!record.rays[i].sun_up()) continue;
+    const IntervalForcing& forcing = record.intervals[i].forcing;
+    const glm::dvec3 normal(record.rays[i].normal(sample));
+    const double sun_j_m2 = 0.5 * forcing.dt_s *
+                            (std::max(0.0, glm::dot(normal, forcing.begin.sun_w_m2)) +
+                             std::max(0.0, glm::dot(normal, forcing.end.sun_w_m2)));
+    all_j_m2 += sun_j_m2;
+    reached_j_m2 += sun_j_m2 * static_cast<double>(sun_frac[i]);
+  }
+  return all_j_m2 > 0.0 ? reached_j_m2 / all_j_m2 : 1.0;
+}
 
 HistoryRecord make_history_record(const StepPlan& plan, const SurfaceHistory& history,
                                   const RecordInputs& inputs) {

@@ -22,6 +22,11 @@ struct HistoryRecord {
   [[nodiscard]] std::size_t size() const noexcept { return intervals.size(); }
 };
 
+/// Returns the share of the sun that reaches a sample over the record, by the energy on its face.
+/// `sun_frac` has the share of each interval. It is 1 where no sun shines on the face. RT-safe.
+[[nodiscard]] double sun_share(const HistoryRecord& record, const SurfaceSample& sample,
+                               std::span<const float> sun_frac) noexcept;
+
 /// Inputs of make_history_record(). All of them must outlive the call.
 struct RecordInputs {
   const SampleHeat& heat;                 ///< thermal model, which sizes and fills the gains

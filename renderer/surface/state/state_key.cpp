@@ -146,8 +146,9 @@ std::uint64_t weather_hash(const scene::ScenarioDesc& scenario) {
 std::uint64_t thermal_hash(const scene::ScenarioDesc& scenario) {
   const scene::ThermalOptions& o = scenario.thermal;
   Fnv64 hash;
-  add(hash, o.model, o.tolerance_k, o.initial_k, o.history_start_ns, o.spin_up_ns, o.foster_modes,
-      o.steps, o.spacing, o.first_step_s, o.max_samples, o.lateral, o.exchange, o.film_factor);
+  add(hash, o.model, o.tolerance_k, o.initial_k, o.initial_stated, o.history_start_ns, o.spin_up_ns,
+      o.foster_modes, o.steps, o.spacing, o.first_step_s, o.max_samples, o.lateral, o.exchange,
+      o.film_factor);
   for (const scene::ContactDesc& contact : scenario.contacts) {
     add(hash, contact.between, contact.resistance_m2k_w);
   }

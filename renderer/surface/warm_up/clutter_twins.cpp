@@ -15,7 +15,8 @@ namespace {
 /// Samples in one task of a parallel loop.
 constexpr std::size_t kGrain = 256;
 
-/// Finds the states of twins at the start of the history. Neighbours face alike and start alike.
+/// Finds the states of twins at the start of the history. Neighbours face alike and share the start
+/// in the open.
 void start_twins(const SurfaceInputs& inputs, const SurfaceSamples& all,
                  SampleHistories& histories) {
   const std::size_t count = all.samples.size() - all.first_twin;
@@ -27,7 +28,7 @@ void start_twins(const SurfaceInputs& inputs, const SurfaceSamples& all,
       const SurfaceSample& twin = all.samples[s];
       const glm::vec3 normal = inputs.record.rays.front().normal(twin);
       const auto make = [&] {
-        return inputs.heat.start_state(twin, normal, inputs.history, inputs.record.tail);
+        return inputs.heat.open_start(twin, normal, inputs.history, inputs.record.tail);
       };
       if (material != twin.material || facing != normal) {
         material = twin.material;
@@ -35,6 +36,9 @@ void start_twins(const SurfaceInputs& inputs, const SurfaceSamples& all,
         known = make();
       }
       histories.start[s] = known;
+      inputs.heat.hide_start(twin, normal, inputs.history,
+                             sun_share(inputs.record, twin, histories.rows[s].sun_frac),
+                             histories.start[s]);
       // Under a solid it has no heat of its own; see FosterHeat::begin_column().
       if (twin.covered && all.samples[twin.twin_of].column != kNoSample) {
         histories.start[s].modes_k = {};

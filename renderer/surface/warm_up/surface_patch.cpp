@@ -93,15 +93,18 @@ PatchSampler::PatchSampler(const SurfaceInputs& inputs, const DriveSensitivity& 
   }
 }
 
-SampleState PatchSampler::start_state(const SurfaceSample& sample, StartMemo& memo) const noexcept {
+SampleState PatchSampler::start_state(const SurfaceSample& sample, std::span<const float> sun_frac,
+                                      StartMemo& memo) const noexcept {
   const glm::vec3 normal = in_.record.rays.front().normal(sample);
   const auto make = [&] {
-    return in_.heat.start_state(sample, normal, in_.history, in_.record.tail);
+    return in_.heat.open_start(sample, normal, in_.history, in_.record.tail);
   };
   if (memo.material != sample.material || memo.normal != normal) {
     memo = {sample.material, normal, make()};
   }
-  return memo.state;
+  SampleState state = memo.state;
+  in_.heat.hide_start(sample, normal, in_.history, sun_share(in_.record, sample, sun_frac), state);
+  return state;
 }
 
 bool PatchSampler::inherit_view(SurfacePatch& patch, std::uint32_t index,
@@ -455,7 +458,7 @@ void PatchSampler::integrate(std::span<const NewSample> samples, StartMemo& memo
     const auto [patch, index] = place_of(samples[k]);
     faces[k] = {alone(*patch, index), SentRow(patch->sent.row(index))};
     const SurfaceSample& front = faces[k].sample;
-    states[k] = start_state(front, memo);
+    states[k] = start_state(front, patch->sun_frac.row(index), memo);
     if (keeps) patch->start_k[index] = states[k].modes_k;
     fronts[k].sample = &front;
     fronts[k].state = &states[k];

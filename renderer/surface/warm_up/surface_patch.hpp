@@ -119,8 +119,8 @@ class PatchSampler {
     return options_.exchange || options_.lateral || in_.heat.has_bodies() || in_.heat.has_twins();
   }
 
-  /// Start state of the latest sample. Neighbours face alike and start with the same state. Each
-  /// thread has its own memo.
+  /// Start of the latest sample in the open. Neighbours face alike and share it. Each thread has
+  /// its own memo.
   struct StartMemo {
     std::uint32_t material = kNoSample;
     glm::vec3 normal{0.0F};
@@ -134,8 +134,10 @@ class PatchSampler {
   void evaluate(std::span<const NewSample> samples, StartMemo& memo) const;
 
  private:
-  /// State at the start of the record, by the thermal model.
+  /// State at the start of the record, by the thermal model. `sun_frac` has the share of the sun
+  /// that reaches the sample, by interval.
   [[nodiscard]] SampleState start_state(const SurfaceSample& sample,
+                                        std::span<const float> sun_frac,
                                         StartMemo& memo) const noexcept;
 
   /// Takes the mean of the parents' views if their own views were about the mean of their parents'.

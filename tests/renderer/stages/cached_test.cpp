@@ -437,9 +437,11 @@ TEST(RendererCached, GroundUnderARoofHasKnownItsShadeForDaysFromTheFirstFrameOn)
   // This is the start that scenarios have which state none.
   scenario.thermal.history_start_ns = -84 * kHourNs;
   scenario.thermal.steps = 64;
+  // The judge has another temperature at its start, 20 days ago.
   auto week = scenario;
-  week.thermal.history_start_ns = -168 * kHourNs;
-  week.thermal.steps = 300;
+  week.thermal.history_start_ns = -480 * kHourNs;
+  week.thermal.steps = 400;
+  scenario.thermal.initial_stated = false;
   for (const std::int64_t hours : {4, 14}) {
     const physics::Pose pose = looking({-2.0, -14.0, 1.6}, {0.5, 0.0, 0.0});
     const auto first_k = Session(scenario).frame_k(hours * kHourNs, pose);

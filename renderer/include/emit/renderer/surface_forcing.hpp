@@ -74,6 +74,8 @@ struct FosterMaterial {
   double emissivity_frac = 1.0;
   double base_k = 0.0;
   double initial_k = 0.0;
+  /// Nobody has stated initial_k: the surface begins in the balance of its own first day.
+  bool starts_balanced = false;
   double prescribed_k = 0.0;
   double roughness = 1.0;          ///< factor of the forced part of the film (physics.md eq. 34)
   physics::MoistSurface moisture;  ///< exchange of water with the air

@@ -8,6 +8,7 @@
 #include "emit/physics/check.hpp"
 #include "emit/reference/surface_forcing.hpp"
 #include "emit/reference/surface_water.hpp"
+#include "emit/scene/base.hpp"
 
 namespace emit::reference {
 namespace {
@@ -86,6 +87,7 @@ PointSolver::PointSolver(const SurfaceClimate& climate, const LayerMesh& mesh,
     : climate_(&climate),
       material_(&material),
       initial_k_(material.initial_k.value_or(initial_k)),
+      balanced_(!climate.stated_start_k(material, initial_k)),
       solver_(mesh, steps),
       spin_up_k_(mesh.nodes()) {
   start_profile_ = steady_profile(solid_layers(material.layers), initial_k_,
@@ -173,25 +175,96 @@ void PointSolver::advance(const SurfaceOptics& surface, const Views& views,
   }
 }
 
-void PointSolver::spin_up(const SurfaceOptics& surface, std::span<const MotionSample> rest) {
-  // Run from the steady profile with an open view.
-  now_ns_ = climate_->start_ns();
+void PointSolver::rewind(std::int64_t now_ns) noexcept {
+  now_ns_ = now_ns;
   climate_row_ = 0;
   view_row_ = 0;
   back_row_ = 0;
+  base_row_ = 0;
   motion_row_ = 0;
-  solver_.start(start_profile_, 0.0);
+}
+
+BalancedStart PointSolver::start_of(const SurfaceOptics& surface, const Views& views,
+                                    std::int64_t start_ns) {
   const ViewSample open = open_view(surface.normal);
-  const ViewSample open_behind = open_view(-surface.normal);
-  Views views{std::span(&open, 1), std::span(&open_behind, 1)};
+  Views seen = views;
+  if (seen.front.empty()) seen.front = std::span(&open, 1);
+  // The mean of the surface is that of its temperatures every quarter of an hour.
+  constexpr std::int64_t kParts = 96;
+  const auto run_day = [&] {
+    rewind(start_ns);
+    double sum_k = 0.5 * solver_.face_k();
+    for (std::int64_t part = 1; part <= kParts; ++part) {
+      advance(surface, seen, start_ns + scene::kBalancedDayNs / kParts * part);
+      sum_k += (part == kParts ? 0.5 : 1.0) * solver_.face_k();
+    }
+    return sum_k / static_cast<double>(kParts);
+  };
+  const double base_k =
+      views.base.empty() ? material_->base_k : value_at(views.base, start_ns, 0).kelvin;
+  return balanced_start(solver_, solid_layers(material_->layers), base_k, initial_k_,
+                        seconds(start_ns), run_day);
+}
+
+double PointSolver::balanced_mean_k(const glm::dvec3& normal) {
+  return start_of(
+             SurfaceOptics{normal, material_->solar_absorptance_frac, material_->emissivity_frac,
+                           scene::roughness_factor(material_->roughness), false,
+                           scene::moisture_of(*material_), rain_ != nullptr},
+             {}, climate_->start_ns())
+      .mean_k;
+}
+
+ViewSample PointSolver::mean_view(const glm::dvec3& normal, const Views& seen) const noexcept {
+  ViewSample mean = open_view(normal);
+  if (seen.front.empty()) return mean;
+  mean.sky_frac = seen.front.front().sky_frac;
+  // Weigh the visible share of the sun by the energy on the face, every quarter of an hour of the
+  // first day.
+  constexpr std::int64_t kParts = 96;
+  double all_w_m2 = 0.0;
+  double seen_w_m2 = 0.0;
+  std::size_t row = 0;
+  for (std::int64_t part = 0; part < kParts; ++part) {
+    const std::int64_t at_ns = climate_->history_start_ns() + scene::kBalancedDayNs / kParts * part;
+    if (at_ns > seen.front.back().time_ns) break;
+    seek(seen.front, at_ns, row);
+    const ClimateNode now = climate_->at(at_ns);
+    const double sun_w_m2 = now.direct_normal_w_m2 * std::max(0.0, glm::dot(normal, now.to_sun));
+    all_w_m2 += sun_w_m2;
+    seen_w_m2 += sun_w_m2 * value_at(seen.front, at_ns, row).sun_frac;
+  }
+  if (all_w_m2 > 0.0) mean.sun_frac = seen_w_m2 / all_w_m2;
+  return mean;
+}
+
+void PointSolver::spin_up(const SurfaceOptics& surface, std::span<const MotionSample> rest,
+                          const Views& seen) {
+  // Run with an open view, or with the mean of what a balanced point sees later.
+  const ViewSample before = balanced_ ? mean_view(surface.normal, seen) : open_view(surface.normal);
+  const ViewSample behind = open_view(-surface.normal);
+  Views views{std::span(&before, 1), std::span(&behind, 1), seen.front_rain_frac,
+              seen.back_rain_frac};
+  if (!balanced_) views.front_rain_frac = views.back_rain_frac = std::nullopt;
   views.motion = rest;
-  advance(surface, views, climate_->history_start_ns());
+  views.base = seen.base;
+  const std::int64_t start_ns = climate_->start_ns();
+  const std::int64_t history_ns = climate_->history_start_ns();
+  if (balanced_) {
+    // Without a spin-up the first day of the history itself is repeated.
+    const Views& first = start_ns < history_ns ? views : seen;
+    solver_.start_nodes(start_of(surface, first, start_ns).node_k, 0.0);
+  } else {
+    solver_.start(start_profile_, 0.0);
+  }
+  rewind(start_ns);
+  advance(surface, views, history_ns);
   // Store the profile for further points of this orientation.
   solver_.copy_nodes_k(spin_up_k_);
   spin_up_normal_ = surface.normal;
   spin_up_up_m_ = rest.empty() ? 0.0 : rest.front().up_m;
   spin_up_film_body_ = surface.film_body;
-  has_spin_up_ = true;
+  has_spin_up_ = !balanced_;
 }
 
 void PointSolver::run(const glm::dvec3& normal, const Views& views,
@@ -218,19 +291,6 @@ void PointSolver::run(const glm::dvec3& normal, const Views& views,
                               scene::moisture_of(*material_),
                               rain_ != nullptr,
                               views.film_body};
-  // Repeat the spin-up only for another orientation, height or flow.
-  if (!has_spin_up_ || surface.normal != spin_up_normal_ ||
-      (rest ? rest->up_m : 0.0) != spin_up_up_m_ || !(views.film_body == spin_up_film_body_)) {
-    spin_up(surface, rest ? std::span(&*rest, 1) : std::span<const MotionSample>());
-  }
-  const std::int64_t start_ns = climate_->history_start_ns();
-  solver_.start_nodes(spin_up_k_, seconds(start_ns));
-  now_ns_ = start_ns;
-  climate_row_ = 0;
-  view_row_ = 0;
-  back_row_ = 0;
-  base_row_ = 0;
-  motion_row_ = 0;
   // Replace empty views by open ones.
   const ViewSample open = open_view(normal);
   const ViewSample open_behind = open_view(-normal);
@@ -241,6 +301,14 @@ void PointSolver::run(const glm::dvec3& normal, const Views& views,
                    views.base,
                    views.motion,
                    views.film_body};
+  // Repeat the spin-up for another orientation, height or flow, or for other views in balance.
+  if (!has_spin_up_ || surface.normal != spin_up_normal_ ||
+      (rest ? rest->up_m : 0.0) != spin_up_up_m_ || !(views.film_body == spin_up_film_body_)) {
+    spin_up(surface, rest ? std::span(&*rest, 1) : std::span<const MotionSample>(), seen);
+  }
+  const std::int64_t start_ns = climate_->history_start_ns();
+  solver_.start_nodes(spin_up_k_, seconds(start_ns));
+  rewind(start_ns);
   // Advance from answer to answer.
   double first_j_m2 = 0.0;
   for (std::size_t i = 0; i < times_ns.size(); ++i) {

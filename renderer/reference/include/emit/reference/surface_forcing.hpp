@@ -11,6 +11,7 @@
 #include "emit/physics/air_film.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/physics/evaporation.hpp"
+#include "emit/reference/balanced_start.hpp"
 #include "emit/reference/cloud_sun.hpp"
 #include "emit/reference/layer_solver.hpp"
 #include "emit/scene/scene_desc.hpp"
@@ -71,6 +72,10 @@ class SurfaceClimate {
   [[nodiscard]] std::int64_t history_start_ns() const noexcept { return history_start_ns_; }
   /// Start of the spin-up, ns of simulated time.
   [[nodiscard]] std::int64_t start_ns() const noexcept { return nodes_.front().time_ns; }
+  /// Returns the start of a material's surface: absent if it begins in the balance of its own first
+  /// day, which nobody has stated a temperature for.
+  [[nodiscard]] std::optional<double> stated_start_k(const scene::Material& material,
+                                                     double initial_k) const noexcept;
   [[nodiscard]] double surroundings_reflectance_frac() const noexcept { return reflectance_frac_; }
   /// Returns the climate at any instant. The value after a jump counts if a jump lies at that
   /// instant. Outside the nodes the first or last value holds.
@@ -85,6 +90,7 @@ class SurfaceClimate {
   std::shared_ptr<const CloudSun> clouds_;
   std::int64_t history_start_ns_ = 0;
   double reflectance_frac_ = 0.0;
+  bool starts_balanced_ = false;
 };
 
 /// View of a surface point. It is linear between samples and constant outside them; two samples at
@@ -156,10 +162,12 @@ struct SurfaceOptics {
 class RainCourses;
 
 /// Solver of the surface temperature of points of one material. At the climate's start the profile
-/// is the steady one between the initial temperature and the base. Until the history starts the
-/// point is unshadowed; from then on its view follows its samples.
-/// Owner: the caller, one solver per thread. Climate, mesh and material must outlive it. The solver
-/// stores the spin-up of one orientation; run() allocates only for another orientation.
+/// is the steady one between the initial temperature and the base, or the balance of the point's
+/// own first day where nobody has stated a temperature (balanced_start()). Until the history starts
+/// the point is unshadowed; a point that begins in its balance has its own mean sun and sky then.
+/// From then on its view follows its samples. Owner: the caller, one solver per thread. Climate,
+/// mesh and material must outlive it. The solver stores the spin-up of one orientation; run()
+/// allocates only for another orientation.
 class PointSolver {
  public:
   PointSolver(const SurfaceClimate& climate, const LayerMesh& mesh, const scene::Material& material,
@@ -189,17 +197,30 @@ class PointSolver {
   void run(const glm::dvec3& normal, const Views& views, std::span<const std::int64_t> times_ns,
            std::span<double> out_k, std::span<double> out_base_j_m2 = {});
 
+  /// Returns the mean temperature of an unshadowed surface in the balance of its first day. It
+  /// allocates. @pre the material has layers
+  [[nodiscard]] double balanced_mean_k(const glm::dvec3& normal);
+
   /// Solver after run(), with profile and counters.
   [[nodiscard]] const LayerSolver& solver() const noexcept { return solver_; }
 
  private:
-  void spin_up(const SurfaceOptics& surface, std::span<const MotionSample> rest);
+  /// Finds the profile at the start of the history.
+  void spin_up(const SurfaceOptics& surface, std::span<const MotionSample> rest, const Views& seen);
+  /// Finds the balance of the day that begins at `start_ns`.
+  [[nodiscard]] BalancedStart start_of(const SurfaceOptics& surface, const Views& views,
+                                       std::int64_t start_ns);
+  /// Returns what the point sees of sun and sky in the mean of its first day.
+  [[nodiscard]] ViewSample mean_view(const glm::dvec3& normal, const Views& seen) const noexcept;
+  /// Returns to the first rows of climate and views, at an instant.
+  void rewind(std::int64_t now_ns) noexcept;
   void advance(const SurfaceOptics& surface, const Views& views, std::int64_t until_ns) noexcept;
   [[nodiscard]] double seconds(std::int64_t time_ns) const noexcept;
 
   const SurfaceClimate* climate_;
   const scene::Material* material_;
   double initial_k_;
+  bool balanced_;  ///< nobody has stated initial_k_
   LayerSolver solver_;
   std::int64_t now_ns_ = 0;
   std::size_t climate_row_ = 0;

@@ -372,6 +372,9 @@ struct ThermalOptions {
   ThermalModel model = ThermalModel::emit2014;  ///< scenario files default to foster
   double tolerance_k = 0.1;
   double initial_k = 290.0;           ///< surface temperature at history start
+  /// False: nobody has stated initial_k. Surfaces of foster then begin in the balance of their own
+  /// first day, if history and spin-up have one.
+  bool initial_stated = true;
   std::int64_t history_start_ns = 0;  ///< sim time at which the thermal simulation starts
   /// Length of the time before the history start in which forcing without shadows acts on a steady
   /// profile. emit2014 ignores it. Scenario files default to two days for foster.
