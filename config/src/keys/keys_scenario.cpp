@@ -396,9 +396,8 @@ const KeyTable<ThermalOptions>& thermal_keys() {
           "refines surfaces for it. per-frame with emit2014 does not use it."),
       open_default(number<ThermalOptions>(
           "initial_k", "K", between(150, 1000), EMIT_FIELD(initial_k),
-          "Temperature of surfaces at the start: of the spin-up with foster, "
-          "of the history with emit2014. Without it the daily mean of the "
-          "air.")),
+          "Temperature of surfaces at the start: of the spin-up with foster, of the history with "
+          "emit2014. Without it: see Thermal history.")),
       open_default(nanoseconds<ThermalOptions>(
           "history_start_s", "s", 1e9, between(-limits::kMaxSimTimeS, limits::kMaxSimTimeS),
           EMIT_FIELD(history_start_ns),
