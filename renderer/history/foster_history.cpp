@@ -353,7 +353,7 @@ void FosterHistory::take_day(const Environment& environment) noexcept {
       carry(interval_between(node_ns(i), node_ns(i + 1), environment), tolerance_k_, day_[i]);
     }
   };
-  // What the surroundings send does not reach themselves, so that their own day comes first.
+  // The surroundings do not see themselves, so that their own day comes first.
   carry_day(surroundings_start_);
   if (!surroundings_.starts_balanced) return;
   const std::size_t last = materials_.size();

@@ -13,7 +13,7 @@
 /// own first day.
 namespace emit::renderer {
 
-/// What reaches a face of sun and sky.
+/// The type says what reaches a face of sun and sky.
 struct FaceOpening {
   glm::dvec3 normal{0.0, 0.0, 1.0};  ///< unit vector, world axes
   double sun_frac = 1.0;             ///< share of the sun on the face that nothing hides, 0..1

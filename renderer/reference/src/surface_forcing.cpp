@@ -271,7 +271,7 @@ Result<SurfaceClimate> SurfaceClimate::create(const scene::ScenarioDesc& scenari
   std::vector<double> ground_k(climate.nodes_.size(), ground->prescribed_k.value_or(0.0));
   double initial_k = ground->initial_k.value_or(scenario.thermal.initial_k);
   if (!climate.stated_start_k(*ground, initial_k)) {
-    // What the surroundings send does not reach themselves: they may be balanced without it.
+    // The surroundings do not see themselves: they may be balanced without what they send.
     initial_k = PointSolver(climate, *mesh, *ground, initial_k, options.steps)
                     .balanced_mean_k({0.0, 0.0, 1.0});
   }

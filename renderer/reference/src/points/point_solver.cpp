@@ -251,7 +251,7 @@ void PointSolver::spin_up(const SurfaceOptics& surface, std::span<const MotionSa
   const std::int64_t start_ns = climate_->start_ns();
   const std::int64_t history_ns = climate_->history_start_ns();
   if (balanced_) {
-    // Without a spin-up the first day of the history itself is repeated.
+    // Repeat the first day of the history itself where there is no spin-up.
     const Views& first = start_ns < history_ns ? views : seen;
     solver_.start_nodes(start_of(surface, first, start_ns).node_k, 0.0);
   } else {

@@ -371,7 +371,7 @@ struct ThermalOptions {
   ThermalMethod method = ThermalMethod::cached;
   ThermalModel model = ThermalModel::emit2014;  ///< scenario files default to foster
   double tolerance_k = 0.1;
-  double initial_k = 290.0;           ///< surface temperature at history start
+  double initial_k = 290.0;  ///< surface temperature at history start
   /// False: nobody has stated initial_k. Surfaces of foster then begin in the balance of their own
   /// first day, if history and spin-up have one.
   bool initial_stated = true;
