@@ -66,6 +66,14 @@ reference::SurfaceClimate equal_climate(const scene::ScenarioDesc& scenario, std
   return std::move(*climate);
 }
 
+/// Returns the forcing of the renderer over the half hours of the day from time 0 on.
+physics::Result<std::vector<renderer::IntervalForcing>> day_of(
+    const scene::ScenarioDesc& scenario) {
+  std::vector<std::int64_t> nodes;
+  for (std::int64_t half = 0; half <= 48; ++half) nodes.push_back(half * kOneHourNs / 2);
+  return renderer::surface_forcing(scenario, nodes, scenario.materials);
+}
+
 struct Case {
   std::size_t material;
   double sky_frac;
@@ -123,13 +131,9 @@ TEST_P(BalancedStart, IsWhatHundredsOfEqualDaysLeaveInTheRenderer) {
   const std::vector<double>& truth_k = truth_of(GetParam());
   constexpr double kReferenceK = 300.0;
   const scene::ScenarioDesc scenario = equal_days(-1, 2);
-  std::vector<std::int64_t> nodes;
-  for (std::int64_t half = 0; half <= 48; ++half) nodes.push_back(half * kOneHourNs / 2);
-  const auto day = renderer::surface_forcing(scenario, nodes, scenario.materials);
+  const auto day = day_of(scenario);
   ASSERT_TRUE(day.has_value());
-  scene::ThermalOptions options;
-  options.initial_stated = false;
-  const auto materials = renderer::foster_materials(scenario.materials, options);
+  const auto materials = renderer::foster_materials(scenario.materials, {});
   ASSERT_TRUE(materials.has_value());
   const renderer::FosterMaterial& material = (*materials)[GetParam().material];
   renderer::OpeningStates states;
@@ -158,13 +162,9 @@ TEST(BalancedStartOfFaces, IsTheSteadyStateWithoutADay) {
     row.diffuse_horizontal_w_m2 = 300.0;
     row.film_w_m2_k = 12.0;
   }
-  std::vector<std::int64_t> nodes;
-  for (std::int64_t half = 0; half <= 48; ++half) nodes.push_back(half * kOneHourNs / 2);
-  const auto day = renderer::surface_forcing(scenario, nodes, scenario.materials);
+  const auto day = day_of(scenario);
   ASSERT_TRUE(day.has_value());
-  scene::ThermalOptions options;
-  options.initial_stated = false;
-  const auto materials = renderer::foster_materials(scenario.materials, options);
+  const auto materials = renderer::foster_materials(scenario.materials, {});
   ASSERT_TRUE(materials.has_value());
   renderer::OpeningStates states;
   states.resize(materials->size());
