@@ -93,15 +93,14 @@ FosterState<double> periodic_of(const Face& face, std::span<const IntervalForcin
   const physics::FosterNetwork& network = face.material.network;
   double day_s = 0.0;
   for (const IntervalForcing& interval : day) day_s += interval.dt_s;
-  // Find what is left of each mode after a day, and the resistance of those that follow a new flux
-  // within it.
-  FosterState<double> left{};
+  // Find which share of each mode is gone after a day, and the resistance of those that follow a
+  // new flux within it.
+  FosterState<double> gone_frac{};
   double follows_m2k_w = 0.0;
   for (std::size_t i = 0; i < network.count; ++i) {
     const double tau_s = network.modes[i].tau_s;
-    left[i] = std::exp(-day_s / tau_s);
-    follows_m2k_w +=
-        network.modes[i].resistance_m2k_w * (1.0 + std::expm1(-day_s / tau_s) * tau_s / day_s);
+    gone_frac[i] = -std::expm1(-day_s / tau_s);
+    follows_m2k_w += network.modes[i].resistance_m2k_w * (1.0 - gone_frac[i] * tau_s / day_s);
   }
   // Begin at the temperature of the base, without a mean flux.
   double flux_w_m2 = 0.0;
@@ -119,7 +118,7 @@ FosterState<double> periodic_of(const Face& face, std::span<const IntervalForcin
     const FosterState<double> next = physics::foster_steady(mean.flux_w_m2, face.surface);
     double moved_k = 0.0;
     for (std::size_t i = 0; i < network.count; ++i) {
-      const double periodic_k = (x[i] - begin[i] * left[i]) / (1.0 - left[i]);
+      const double periodic_k = begin[i] + (x[i] - begin[i]) / gone_frac[i];
       moved_k += std::abs(periodic_k - next[i] - swing[i]);
       swing[i] = periodic_k - next[i];
     }

@@ -57,6 +57,11 @@ class SurfaceHistory {
   /// @pre material is an index into the scene's materials
   [[nodiscard]] physics::FosterState<double> start_states(std::size_t material,
                                                           const glm::dvec3& normal) const noexcept;
+  /// Returns whether surfaces of a material begin in the balance of their own first day. None does
+  /// with emit2014.
+  [[nodiscard]] bool starts_balanced(std::size_t material) const noexcept {
+    return foster_ && foster_->materials()[material].starts_balanced;
+  }
   /// Returns by how much less sun and sky have changed them (FosterHistory::hidden_states()). With
   /// emit2014 it is 0.
   [[nodiscard]] physics::FosterState<double> hidden_states(std::size_t material,

@@ -36,9 +36,11 @@ void start_twins(const SurfaceInputs& inputs, const SurfaceSamples& all,
         known = make();
       }
       histories.start[s] = known;
-      inputs.heat.hide_start(twin, normal, inputs.history,
-                             sun_share(inputs.record, twin, histories.rows[s].sun_frac),
-                             histories.start[s]);
+      if (inputs.history.starts_balanced(twin.material)) {
+        inputs.heat.hide_start(twin, normal, inputs.history,
+                               sun_share(inputs.record, twin, histories.rows[s].sun_frac),
+                               histories.start[s]);
+      }
       // Under a solid it has no heat of its own; see FosterHeat::begin_column().
       if (twin.covered && all.samples[twin.twin_of].column != kNoSample) {
         histories.start[s].modes_k = {};

@@ -103,6 +103,7 @@ SampleState PatchSampler::start_state(const SurfaceSample& sample, std::span<con
     memo = {sample.material, normal, make()};
   }
   SampleState state = memo.state;
+  if (!in_.history.starts_balanced(sample.material)) return state;
   in_.heat.hide_start(sample, normal, in_.history, sun_share(in_.record, sample, sun_frac), state);
   return state;
 }
