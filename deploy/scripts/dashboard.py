@@ -87,7 +87,7 @@ ROWS = [
          "model does not hold for. Each frame says degraded.",
          *[(per_minute(f"emitd_frames_{name}_total"), name.replace("_", " "))
            for name in ("wet_unknown", "rain_shelter", "snowfall", "freezing", "melting", "humidity_unknown",
-                        "strong_wind", "longwave_low")]),
+                        "strong_wind", "longwave_low", "layers_invalid")]),
     ]),
     ("Delay", [
         ("Pose to last byte", "timeseries", 8, "s", f"From the arrival of a pose to the last byte of its frame. {BOUND}",

@@ -166,7 +166,7 @@ FosterDrive<double> unshadowed_drive(const SurfaceForcing& f, const FosterMateri
   const double long_wave_w_m2 = sky_frac * f.longwave_w_m2 + (1.0 - sky_frac) * f.environment_w_m2;
   FosterDrive<double> drive{.absorbed_w_m2 = material.solar_absorptance_frac * short_wave_w_m2 +
                                              material.emissivity_frac * long_wave_w_m2,
-                            .film_w_m2_k = physics::film_w_m2_k(f.film, normal, material.roughness,
+                            .film_w_m2_k = physics::film_w_m2_k(f.film, normal, material.skin,
                                                                 reference_k + offset_k - f.air_k),
                             .air_offset_k = f.air_k - reference_k};
   physics::add_moisture(moisture_at(material, f, rain_by_tilt_frac(normal.z)), f.moist,
@@ -181,7 +181,7 @@ physics::Result<std::vector<FosterMaterial>> foster_materials(
     FosterMaterial entry;
     entry.solar_absorptance_frac = material.solar_absorptance_frac;
     entry.emissivity_frac = material.emissivity_frac;
-    entry.roughness = scene::roughness_factor(material.roughness);
+    entry.skin = scene::film_skin(material);
     entry.moisture = scene::moisture_of(material);
     entry.store = scene::water_store_of(material);
     entry.snow_or_ice = scene::is_snow_or_ice(material);

@@ -22,7 +22,7 @@ bool dry_alike(const FosterMaterial& a, const FosterMaterial& b) noexcept {
   const auto same_mode = [](const physics::NetworkMode& x, const physics::NetworkMode& y) {
     return x.tau_s == y.tau_s && x.resistance_m2k_w == y.resistance_m2k_w;
   };
-  return a.store == b.store && a.moisture == b.moisture && a.roughness == b.roughness &&
+  return a.store == b.store && a.moisture == b.moisture && a.skin == b.skin &&
          a.solar_absorptance_frac == b.solar_absorptance_frac &&
          a.emissivity_frac == b.emissivity_frac && a.base_k == b.base_k &&
          a.initial_k == b.initial_k && a.body == b.body && a.network.count == b.network.count &&

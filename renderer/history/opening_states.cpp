@@ -31,8 +31,8 @@ FosterDrive<double> face_drive(const SurfaceForcing& f, const FosterMaterial& ma
   const double side = std::sqrt(std::max(0.0, 1.0 - up * up));
   const double excess_k = reference_k + offset_k - f.air_k;
   const auto film = [&](double east, double north) {
-    return physics::film_w_m2_k(f.film, glm::dvec3(side * east, side * north, up),
-                                material.roughness, excess_k);
+    return physics::film_w_m2_k(f.film, glm::dvec3(side * east, side * north, up), material.skin,
+                                excess_k);
   };
   const double film_w_m2_k =
       side == 0.0 ? film(0.0, 0.0)

@@ -225,6 +225,7 @@ class GlRenderer final : public Renderer {
   SceneStats scene_stats_;
   SceneHistory history_;
   bool unknown_wet_ = false;  ///< some material does not state what rain does to it
+  bool guide_only_ = false;   ///< some material is more than dry layers
   std::vector<std::uint32_t> entity_ids_;
   BandModel bands_;
   std::optional<GasModel> gas_;
@@ -331,6 +332,9 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
                                geometry.warnings.end());
   const std::vector<std::uint32_t> bare = scene::materials_without_rain(scenario.thermal, geometry);
   unknown_wet_ = !bare.empty();
+  guide_only_ = std::ranges::any_of(geometry.materials, [](const scene::Material& material) {
+    return !material.dry_layers_valid && !material.prescribed_k;
+  });
   add_heat_warnings(scenario, geometry, bare, history_.environment.rains(), scene_stats_.warnings);
   if (!scenario.contacts.empty()) {
     const scene::ThermalOptions& thermal = scenario.thermal;
@@ -734,6 +738,7 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
                                                    request.thermal_time_ns) > kLeastMm) {
     add(view.stats.heat_limits, HeatLimit::rain_unknown);
   }
+  if (guide_only_) add(view.stats.heat_limits, HeatLimit::layers_invalid);
   view.stats.plain_targets = passes_.targets ? stage_->drawn().lists.plain_targets() : 0;
   bind_frame();
   // Clear the counters, then issue all passes and the read-back.

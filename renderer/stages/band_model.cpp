@@ -534,7 +534,10 @@ std::vector<gpu::MaterialParams> material_params(std::span<const scene::Material
     gpu::MaterialParams params{};
     params.solar_absorptance_frac = static_cast<float>(material.solar_absorptance_frac);
     params.emissivity_frac = static_cast<float>(material.emissivity_frac);
-    params.roughness = static_cast<float>(scene::roughness_factor(material.roughness));
+    const physics::FilmSkin skin = scene::film_skin(material);
+    params.roughness = static_cast<float>(skin.roughness);
+    params.leaf_forced = static_cast<float>(skin.leaf_forced);
+    params.leaf_natural = static_cast<float>(skin.leaf_natural);
     const physics::MoistSurface moisture = scene::moisture_of(material);
     params.wetness_frac = static_cast<float>(moisture.wetness_frac);
     params.resistance_s_m = static_cast<float>(moisture.resistance_s_m);

@@ -92,6 +92,8 @@ gpu::FilmParams film_params(const physics::AirFilm& film) noexcept {
   params.rough_frac = static_cast<float>(film.rough_frac);
   params.stated_w_m2_k = static_cast<float>(film.stated_w_m2_k);
   params.model_frac = static_cast<float>(film.model_frac);
+  params.leaf_forced = static_cast<float>(film.leaf_forced);
+  params.leaf_quarter = static_cast<float>(film.leaf_quarter);
   return params;
 }
 

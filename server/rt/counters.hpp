@@ -39,6 +39,7 @@ namespace emit::server {
   X(frames_humidity_unknown, "frames of moist ground whose weather states no humidity")     \
   X(frames_strong_wind, "frames after wind above 20 m/s, beyond the air film")              \
   X(frames_longwave_low, "frames after long-wave irradiance below that of any sky")         \
+  X(frames_layers_invalid, "frames of materials that are more than dry layers")             \
   X(frames_warmed_up, "frames in which the surface warmed up again: sim time jumped")       \
   X(frames_entities_behind, "frames with entities of an older one: more than 128 moved")    \
   X(frames_shed, "frames of less than full quality, to be ready in time")                   \

@@ -47,10 +47,9 @@ TEST_F(ConfigTest, the_shipped_library_is_complete_and_consistent) {
     for (const scene::BandEmissivity& band : material.spread->band_emissivity) {
       EXPECT_GT(band.emissivity_frac, 0.0) << band.band;
     }
-    // Materials that are more than dry layers, or are assumed, say so in words.
-    if (!material.dry_layers_valid || material.prescribed_k) {
-      EXPECT_FALSE(material.uncertainty.empty());
-    }
+    EXPECT_FALSE(material.uncertainty.empty());
+    // Frames of the library's materials are not flagged for what they are made of.
+    EXPECT_TRUE(material.dry_layers_valid || material.prescribed_k);
     if (material.prescribed_k) {
       continue;
     }
@@ -117,16 +116,14 @@ TEST_F(ConfigTest, the_shipped_library_is_complete_and_consistent) {
   }
   EXPECT_EQ(families.count(""), 0U);
   EXPECT_GE(families.size(), 10U);
-  // Plants, water and wet ground evaporate; melting and stirring are named wherever they matter.
+  // Plants, water and wet ground evaporate, and leaves have a film of their own.
   for (const scene::Material& material : loaded->materials) {
-    const bool stirred = material.family == "water, snow and ice";
     const bool moist = material.family == "vegetation" || material.name == "water" ||
                        material.name == "sea" || material.name.ends_with("_wet");
     EXPECT_EQ(moist, !scene::moisture_of(material).dry()) << material.name;
-    EXPECT_TRUE(!stirred || !material.dry_layers_valid) << material.name;
-    if (moist) {
-      EXPECT_FALSE(material.uncertainty.empty()) << material.name;
-    }
+    const bool leafy = material.name == "foliage" || material.name.starts_with("canopy_") ||
+                       material.name == "camouflage_net";
+    EXPECT_EQ(leafy, material.leaf_width_m > 0.0) << material.name;
   }
 }
 

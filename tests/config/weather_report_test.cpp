@@ -12,6 +12,7 @@
 namespace emit::config::testing {
 namespace {
 
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
@@ -66,9 +67,12 @@ TEST_F(ConfigTest, weather_report_of_an_epw_says_what_was_read) {
   ASSERT_NE(wind, nullptr);
   EXPECT_EQ(wind->least, 0.25);
   EXPECT_EQ(wind->most, 6.0);
-  ASSERT_THAT(report->gaps, SizeIs(1));
+  ASSERT_THAT(report->gaps, SizeIs(2));
   EXPECT_EQ(report->gaps[0].from, "1991-06-02 24:00");
   EXPECT_EQ(report->gaps[0].to, "1984-07-01 01:00");
+  EXPECT_EQ(report->gaps[1].from, "1984-07-01 24:00");
+  EXPECT_EQ(report->gaps[1].to, "1991-06-01 01:00");
+  EXPECT_THAT(report->notes, Contains(HasSubstr("it has 3 days of a year")));
   ASSERT_THAT(report->months, SizeIs(2));
   EXPECT_NEAR(report->months[0].beam_kwh_m2_day, 4.0, 1e-9);
   EXPECT_NEAR(report->months[0].beam_w_m2[8], 500.0, 1e-9);

@@ -208,12 +208,23 @@ WeatherReport report_year(const WeatherYear& year, const std::string& name) {
     same.year = 2000;
     return day_of(same);
   };
-  for (std::size_t i = 1; i < year.records.size(); ++i) {
-    const std::int64_t days = day_of_year(year.records[i]) - day_of_year(year.records[i - 1]);
-    const bool leap_day = year.records[i].month == 3 && year.records[i].day == 1 && days == 2;
-    if (days > 1 && !leap_day) {
-      report.gaps.push_back({text_of(year.records[i - 1]), text_of(year.records[i])});
-    }
+  // A year begins again after its end, so that its last record is followed by its first one.
+  constexpr std::int64_t kDaysOf2000 = 366;
+  std::set<std::int64_t> days_there;
+  for (std::size_t i = 1; i <= year.records.size(); ++i) {
+    const YearRecord& record = year.records[i % year.records.size()];
+    const YearRecord& before = year.records[i - 1];
+    days_there.insert(day_of_year(record));
+    const std::int64_t days =
+        (day_of_year(record) - day_of_year(before) + kDaysOf2000) % kDaysOf2000;
+    const bool leap_day = record.month == 3 && record.day == 1 && days == 2;
+    if (days > 1 && !leap_day) report.gaps.push_back({text_of(before), text_of(record)});
+  }
+  if (!report.gaps.empty()) {
+    report.notes.push_back(
+        fmt::format("{}: it has {} days of a year; a simulation on other days lacks weather, and "
+                    "says so",
+                    name, days_there.size()));
   }
   SunCheck check({physics::degrees(year.lat_deg), physics::degrees(year.lon_deg),
                   physics::Metres(year.height_m)});

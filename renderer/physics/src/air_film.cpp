@@ -15,6 +15,14 @@ constexpr double kMeasuredDensityKgM3 = 1.2;
 constexpr double kPlateFromMach = 0.25;
 constexpr double kPlateMach = 0.35;
 constexpr double kTransitionReynolds = 5e5;
+/// Length of a leaf along the flow by its width, and what the turbulence of the open adds to the
+/// laminar film (Campbell and Norman, An Introduction to Environmental Biophysics, 2nd ed., section
+/// 7.7).
+constexpr double kLeafLength = 0.7;
+constexpr double kOutdoors = 1.4;
+/// Wind among the leaves by that beside the crown: exp(-2.5 (1 - z/h)) of Cionco (1972) at z/h =
+/// 0.85, the mean height of the leaves that one sees from above.
+constexpr double kLeafWind = 0.7;
 
 /// Returns the forced film of the plate or the cylinder at a speed.
 double shaped_film_w_m2_k(const AirFlow& flow, double speed_m_s, AirFilmShape shape,
@@ -81,11 +89,21 @@ AirFilm between_films(const AirFilm& a, const AirFilm& b, double f) noexcept {
   for (double AirFilm::*value :
        {&AirFilm::directed_frac, &AirFilm::windward_w_m2_k, &AirFilm::leeward_w_m2_k,
         &AirFilm::vertical_root, &AirFilm::vertical_rise, &AirFilm::unstable_quarter,
-        &AirFilm::unstable_third, &AirFilm::stable_quarter, &AirFilm::rough_frac,
-        &AirFilm::stated_w_m2_k, &AirFilm::model_frac}) {
+        &AirFilm::unstable_third, &AirFilm::stable_quarter, &AirFilm::leaf_forced,
+        &AirFilm::leaf_quarter, &AirFilm::rough_frac, &AirFilm::stated_w_m2_k,
+        &AirFilm::model_frac}) {
     out.*value = a.*value + f * (b.*value - a.*value);
   }
   return out;
+}
+
+FilmSkin leaf_skin(double width_m, double area_index) noexcept {
+  EMIT_DCHECK(width_m > 0.0 && area_index > 0.0);
+  const double root = std::sqrt(kLeafLength * width_m);
+  FilmSkin skin;
+  skin.leaf_forced = 2.0 * area_index / root;
+  skin.leaf_natural = 2.0 * area_index / std::sqrt(root);
+  return skin;
 }
 
 AirFlow air_flow(const Forcing& weather) noexcept {
@@ -162,6 +180,11 @@ AirFilm air_film(const AirFlow& flow, const AirFilmBody& body) noexcept {
   film.unstable_quarter = 0.54 * quarter;
   film.unstable_third = 0.14 * k * std::cbrt(buoyancy);
   film.stable_quarter = 0.27 * quarter;
+  // Set those of leaves, physics.md eq. 90: one side has the unstable film, the other the stable
+  // one.
+  film.leaf_quarter = 0.5 * (0.54 + 0.27) * k * std::pow(buoyancy, 0.25);
+  film.leaf_forced = kOutdoors * 0.664 * k * std::sqrt(kLeafWind * speed_m_s / kinematic_m2_s) *
+                     std::cbrt(air.prandtl);
   // Set the forced part, physics.md eq. 33 and 35.
   const double mach = speed_m_s / sound_m_s(flow.air_k);
   const bool in_wind = body.shape == AirFilmShape::surface;

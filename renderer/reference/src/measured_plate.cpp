@@ -41,8 +41,9 @@ constexpr std::array<Range, 4> kRanges{{{0.0, 1.0, 0.01, "absorptance"},
                                         {150.0, 400.0, 1.0, "base"}}};
 
 /// Returns the film of level ground, W m-2 K-1, before its factor.
-double level_film_w_m2_k(const physics::AirFilm& film, double roughness, double excess_k) {
-  return physics::film_w_m2_k(film, glm::dvec3(0.0, 0.0, 1.0), roughness, excess_k);
+double level_film_w_m2_k(const physics::AirFilm& film, const physics::FilmSkin& skin,
+                         double excess_k) {
+  return physics::film_w_m2_k(film, glm::dvec3(0.0, 0.0, 1.0), skin, excess_k);
 }
 
 /// Face under the weather between two rows.
@@ -50,7 +51,7 @@ class PlateFace final : public FaceModel {
  public:
   PlateFace(const PlateNumbers& numbers, const PlateSetup& setup)
       : numbers_(&numbers),
-        roughness_(setup.roughness),
+        skin_(setup.skin),
         moisture_(setup.moisture),
         pressure_pa_(physics::standard_pressure_pa(setup.height_m)) {}
   void between(const LoggerRow& a, const physics::AirFilm& a_air, const LoggerRow& b,
@@ -83,7 +84,7 @@ class PlateFace final : public FaceModel {
  private:
   [[nodiscard]] double film_at(double f, double excess_k) const noexcept {
     return numbers_->film_factor *
-           level_film_w_m2_k(physics::between_films(*a_air_, *b_air_, f), roughness_, excess_k);
+           level_film_w_m2_k(physics::between_films(*a_air_, *b_air_, f), skin_, excess_k);
   }
   [[nodiscard]] double latent_at(double f, double face_k, double film_w_m2_k) const noexcept {
     if (moisture_.dry() || !(film_w_m2_k > 0.0)) return 0.0;
@@ -96,7 +97,7 @@ class PlateFace final : public FaceModel {
     return face.latent_w_m2(face_k, mix(&LoggerRow::air_k), film_w_m2_k);
   }
   const PlateNumbers* numbers_;
-  double roughness_;
+  physics::FilmSkin skin_;
   physics::MoistSurface moisture_;
   double pressure_pa_;
   double start_s_ = 0.0;
@@ -473,8 +474,7 @@ std::vector<double> measured_films_w_m2_k(const PlateSetup& setup, std::span<con
   out_w_m2_k.reserve(rows.size());
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const double excess_k = rows[i].surface_k - rows[i].air_k;
-    out_w_m2_k.push_back(numbers.film_factor *
-                         level_film_w_m2_k(airs[i], setup.roughness, excess_k));
+    out_w_m2_k.push_back(numbers.film_factor * level_film_w_m2_k(airs[i], setup.skin, excess_k));
   }
   return out_w_m2_k;
 }

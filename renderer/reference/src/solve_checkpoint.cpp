@@ -45,6 +45,7 @@ class Hash {
 void add_material(Hash& hash, const scene::Material& m) {
   hash.add(m.name).add(m.solar_absorptance_frac).add(m.emissivity_frac).add(m.base_k);
   hash.add(m.initial_k).add(m.prescribed_k).add(m.sheet).add(m.layers.size()).add(m.roughness);
+  hash.add(m.leaf_width_m).add(m.leaf_area_index);
   hash.add(m.wetness_frac).add(m.surface_resistance_s_m).add(m.night_resistance_s_m);
   hash.add(m.water_store_mm).add(m.readily_evaporable_mm);
   for (const scene::Layer& l : m.layers) {

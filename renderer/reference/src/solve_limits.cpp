@@ -73,6 +73,16 @@ std::vector<std::string> weather_limits(const scene::ScenarioDesc& scenario,
         dark->longwave_down_w_m2, static_cast<double>(dark->time_ns) * 1e-9, kLeastSkyFrac,
         dark->air_k));
   }
+  std::vector<std::string_view> guides;
+  for (const scene::Material& material : geometry.materials) {
+    if (!material.dry_layers_valid && !material.prescribed_k) guides.push_back(material.name);
+  }
+  if (!guides.empty()) {
+    out.push_back(
+        fmt::format("layers_invalid: {} {} dry_layers_valid = false: temperatures are a "
+                    "guide only",
+                    names_of(guides), guides.size() == 1 ? "states" : "state"));
+  }
   std::vector<std::string_view> moist;
   for (const scene::Material& material : geometry.materials) {
     const bool wet = !scene::moisture_of(material).dry() ||

@@ -40,7 +40,7 @@ ExchangeFace surface_of(const VoxelModel& model, const SolidFace& face,
           face.area_m2,
           material.solar_absorptance_frac,
           material.emissivity_frac,
-          scene::roughness_factor(material.roughness),
+          scene::film_skin(material),
           info.in_cavity};
 }
 
@@ -203,7 +203,7 @@ void SolidRadiation::drive(double time_s, std::span<const double> face_k, const 
   for (std::size_t f = 0; f < n; ++f) {
     const ExchangeFace& s = surfaces_[f];
     out.film_w_m2_k[f] =
-        s.enclosed ? 0.0 : physics::film_w_m2_k(film, s.normal, s.roughness, face_k[f] - now.air_k);
+        s.enclosed ? 0.0 : physics::film_w_m2_k(film, s.normal, s.skin, face_k[f] - now.air_k);
     out.air_k[f] = now.air_k;
     physics::MoistSurface moisture = moisture_[f];
     const RainCourses& water = water_[face_material_[f]];

@@ -127,7 +127,7 @@ FaceState face_state(const ClimateNode& climate, const SurfaceOptics& surface,
   FaceState out{surface.solar_absorptance_frac * shortwave + surface.emissivity_frac * longwave,
                 0.0, climate.air_k,
                 FaceFilm{physics::air_film(climate.flow, surface.film_body), surface.normal,
-                         surface.roughness, surface.both_sides}};
+                         surface.skin, surface.both_sides}};
   if (!surface.moisture.dry() || surface.holds_water) {
     out.moisture =
         FaceMoisture{.vapour_pa = climate.vapour_pa,
@@ -285,7 +285,7 @@ Result<SurfaceClimate> SurfaceClimate::create(const scene::ScenarioDesc& scenari
     const SurfaceOptics surface{{0.0, 0.0, 1.0},
                                 ground->solar_absorptance_frac,
                                 ground->emissivity_frac,
-                                scene::roughness_factor(ground->roughness),
+                                scene::film_skin(*ground),
                                 false,
                                 scene::moisture_of(*ground)};
     std::vector<ForcingRow> rows;

@@ -92,7 +92,7 @@ WaterCourse water_course(std::span<const ClimateNode> nodes, const scene::Materi
   const SurfaceOptics surface{{0.0, 0.0, 1.0},
                               material.solar_absorptance_frac,
                               material.emissivity_frac,
-                              scene::roughness_factor(material.roughness),
+                              scene::film_skin(material),
                               false,
                               scene::moisture_of(material),
                               true};

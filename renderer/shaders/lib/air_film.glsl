@@ -2,11 +2,11 @@
 #ifndef EMIT_LIB_AIR_FILM
 #define EMIT_LIB_AIR_FILM
 
-// Film coefficient of a face in the wind (physics.md eq. 31 to 34). Twin of emit/physics/air_film.hpp.
+// Film coefficient of a face in the wind (physics.md eq. 31 to 34 and 90). Twin of emit/physics/air_film.hpp.
 
-// Film coefficient in W/m2/K of a face of unit normal `n` (world axes, z up), whose material has that roughness factor
-// and which is `excess_k` warmer than the air.
-float film_w_m2_k(FilmParams film, vec3 n, float roughness, float excess_k) {
+// Film coefficient in W/m2/K of a face of unit normal `n` (world axes, z up), which is `excess_k` warmer than the air.
+// `skin` is the roughness factor of its material, and what leaves add to the forced and to the natural part.
+float film_w_m2_k(FilmParams film, vec3 n, vec3 skin, float excess_k) {
   // Compute the natural part. A warm face that looks up, or a cold one that looks down, stirs the air.
   float size_k = abs(excess_k);
   float third = pow(size_k, 1.0 / 3.0);
@@ -24,8 +24,13 @@ float film_w_m2_k(FilmParams film, vec3 n, float roughness, float excess_k) {
   float any_frac = 0.5 + 0.5 / (1.0 + 10.0 * sqrt(max(0.0, 1.0 - n.z * n.z)));
   float windward_frac = mix(any_frac, facing_frac, film.directed_frac);
   float forced = mix(film.leeward_w_m2_k, film.windward_w_m2_k, windward_frac);
+  // Leaves have parts of their own.
+  if (skin.y > 0.0) {
+    natural = skin.z * film.leaf_quarter * quarter;
+    forced = skin.y * film.leaf_forced;
+  }
   // Join both parts with what the user gave.
-  float rough = 1.0 + film.rough_frac * (roughness - 1.0);
+  float rough = 1.0 + film.rough_frac * (skin.x - 1.0);
   float model = natural + rough * (sqrt(natural * natural + forced * forced) - natural);
   return film.stated_w_m2_k + film.model_frac * model;
 }

@@ -14,8 +14,11 @@ vec4 material_resistance_m2k_w(int material, int group) {
   return texelFetch(material_table, material * EMIT_MATERIAL_TEXELS + 2 + group);
 }
 
-// Roughness factor of a material.
-float material_roughness(int material) { return texelFetch(material_table, material * EMIT_MATERIAL_TEXELS + 4).x; }
+// What a material gives to the film of its faces: its roughness factor, and the two numbers of its leaves.
+vec3 material_skin(int material) {
+  return vec3(texelFetch(material_table, material * EMIT_MATERIAL_TEXELS + 4).x,
+              texelFetch(material_table, material * EMIT_MATERIAL_TEXELS + 5).xy);
+}
 
 // Water of a material: wetness (0: dry), resistance to evaporation in sunlight and without it in s/m.
 vec3 material_water(int material) { return texelFetch(material_table, material * EMIT_MATERIAL_TEXELS + 4).yzw; }

@@ -114,7 +114,7 @@ void main() {
   } else {
     x0 = stored_states(px);
   }
-  float roughness = material_roughness(material);
+  vec3 skin = material_skin(material);
   float excess_k = foster_offset_k(x0, s) - step_params.air_start_offset_k;
   // Set up the drive at both ends: absorbed flux, film coefficient, air temperature, exchange of water.
   float short_begin = shortwave_indirect_w_m2(step_params.diffuse_start_w_m2, step_params.reflected_start_w_m2,
@@ -122,11 +122,11 @@ void main() {
   float short_end = shortwave_indirect_w_m2(step_params.diffuse_end_w_m2, step_params.reflected_end_w_m2, sky_frac);
   FosterDrive begin = indirect_drive(surface, short_begin, step_params.longwave_start_w_m2,
                                      step_params.environment_start_w_m2, sky_frac,
-                                     film_w_m2_k(step_params.film_start, n, roughness, excess_k),
+                                     film_w_m2_k(step_params.film_start, n, skin, excess_k),
                                      step_params.air_start_offset_k);
   FosterDrive end = indirect_drive(surface, short_end, step_params.longwave_end_w_m2,
                                    step_params.environment_end_w_m2, sky_frac,
-                                   film_w_m2_k(step_params.film_end, n, roughness, excess_k),
+                                   film_w_m2_k(step_params.film_end, n, skin, excess_k),
                                    step_params.air_end_offset_k);
   int entry = int(step_params.relaxation_offset) + material * EMIT_FOSTER_ENTRIES;
   vec3 water = material_water(material);

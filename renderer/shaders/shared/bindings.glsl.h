@@ -144,7 +144,7 @@
 // foster: the finest split of an interval has 2 to this power parts.
 #define EMIT_FOSTER_LEVELS 6
 // Texels of the material table per material.
-#define EMIT_MATERIAL_TEXELS 5
+#define EMIT_MATERIAL_TEXELS 6
 
 // foster: texels of four floats that hold one number for each of up to six modes. The last two floats are 0.
 #define EMIT_FOSTER_TEXELS 2

@@ -60,7 +60,7 @@ struct DrawParams {
   uint unused1;
 };
 
-// Five texels of the material table.
+// Six texels of the material table.
 struct MaterialParams {
   float solar_absorptance_frac;
   float emissivity_frac;
@@ -75,6 +75,10 @@ struct MaterialParams {
   float wetness_frac;         // foster: share of the surface's potential evaporation; 0: dry
   float resistance_s_m;       // foster: resistance to evaporation in sunlight
   float night_resistance_s_m; // foster: the same without sunlight
+  float leaf_forced;          // foster: what leaves add to the forced part of the film; 0: no leaves
+  float leaf_natural;         // foster: the same of the natural part
+  float unused0;
+  float unused1;
 };
 
 // One light frustum of a history interval. Its coordinates are in metres.
@@ -109,8 +113,8 @@ struct FilmParams {
   float rough_frac;         // share of the material's roughness that counts
   float stated_w_m2_k;      // film that the user gave, multiplied by its share
   float model_frac;         // share of the model in the rest
-  float unused0;
-  float unused1;
+  float leaf_forced;        // forced part on one side of a leaf of 1 m
+  float leaf_quarter;       // its natural part: factor of |dT|^1/4
 };
 
 // Moisture of the air at an instant, the twin of physics::MoistAir (physics.md eq. 47).
@@ -225,10 +229,11 @@ static_assert(sizeof(DrawParams) == 192);
 EMIT_SHARED_OFFSET(DrawParams, material, 112);
 EMIT_SHARED_OFFSET(DrawParams, tile_row, 128);
 EMIT_SHARED_OFFSET(DrawParams, field, 176);
-static_assert(sizeof(MaterialParams) == 80);
+static_assert(sizeof(MaterialParams) == 96);
 EMIT_SHARED_OFFSET(MaterialParams, initial_offset_k, 16);
 EMIT_SHARED_OFFSET(MaterialParams, resistance_m2k_w, 32);
 EMIT_SHARED_OFFSET(MaterialParams, roughness, 64);
+EMIT_SHARED_OFFSET(MaterialParams, leaf_forced, 80);
 static_assert(sizeof(CascadeParams) == 80);
 EMIT_SHARED_OFFSET(CascadeParams, scale_per_m, 48);
 EMIT_SHARED_OFFSET(CascadeParams, end_boresight_m, 60);

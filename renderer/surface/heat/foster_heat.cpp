@@ -102,7 +102,7 @@ FosterHeat::FilmSpan FosterHeat::film_over(const SampleAdvance& each,
   out.begin.moist = air != nullptr ? air->begin_moist : forcing.begin.moist;
   out.end.moist = air != nullptr ? air->end_moist : forcing.end.moist;
   const double excess_k = reference_k_ + offset_k(sample.material, *each.state) - out.begin.air_k;
-  const double roughness = materials_[sample.material].roughness;
+  const physics::FilmSkin& skin = materials_[sample.material].skin;
   const int slot = materials_[sample.material].water_slot;
   const auto add_face = [&](const glm::dvec3& normal, double open_rain_frac, double share_frac) {
     if (slot >= 0) {
@@ -111,13 +111,13 @@ FosterHeat::FilmSpan FosterHeat::film_over(const SampleAdvance& each,
       out.begin.wet_frac += share_frac * forcing.begin.wet_frac_at(s, rain_frac);
       out.end.wet_frac += share_frac * forcing.end.wet_frac_at(s, rain_frac);
     }
-    const double natural = physics::natural_film_w_m2_k(begin, normal.z, excess_k);
+    const double natural = physics::natural_film_w_m2_k(begin, skin, normal.z, excess_k);
     out.begin.film_w_m2_k +=
-        share_frac * physics::joined_film_w_m2_k(
-                         begin, natural, physics::forced_film_w_m2_k(begin, normal), roughness);
+        share_frac * physics::joined_film_w_m2_k(begin, skin, natural,
+                                                 physics::forced_film_w_m2_k(begin, skin, normal));
     out.end.film_w_m2_k +=
-        share_frac * physics::joined_film_w_m2_k(
-                         end, natural, physics::forced_film_w_m2_k(end, normal), roughness);
+        share_frac * physics::joined_film_w_m2_k(end, skin, natural,
+                                                 physics::forced_film_w_m2_k(end, skin, normal));
   };
   // Take the mean of both faces of a sheet. A covered face has no film, so the open one counts.
   const glm::dvec3 normal(each.normal);

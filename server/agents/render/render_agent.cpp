@@ -233,7 +233,7 @@ void RenderAgent::note_heat_limits(const renderer::HeatLimits& limits) noexcept 
   static constexpr std::array<Counter, renderer::kHeatLimits> kCounters{
       Counter::frames_wet_unknown, Counter::frames_rain_shelter, Counter::frames_snowfall,
       Counter::frames_freezing,    Counter::frames_melting,      Counter::frames_humidity_unknown,
-      Counter::frames_strong_wind, Counter::frames_longwave_low};
+      Counter::frames_strong_wind, Counter::frames_longwave_low, Counter::frames_layers_invalid};
   if (limits.none()) return;
   for (std::size_t i = 0; i < renderer::kHeatLimits; ++i) {
     if (!limits[i]) continue;

@@ -64,7 +64,7 @@ physics::FosterDrive<double> drive(const SurfaceForcing& f, const PointView& vie
   physics::FosterDrive<double> out{
       .absorbed_w_m2 = material.solar_absorptance_frac * short_wave_w_m2 +
                        material.emissivity_frac * long_wave_w_m2,
-      .film_w_m2_k = physics::film_w_m2_k(f.film, view.normal, material.roughness,
+      .film_w_m2_k = physics::film_w_m2_k(f.film, view.normal, material.skin,
                                           physics::kReferenceK + offset_k - f.air_k),
       .air_offset_k = f.air_k - physics::kReferenceK};
   physics::add_moisture(

@@ -171,7 +171,7 @@ class RealTimePlate {
     const double film_w_m2_k =
         n.film_factor *
         physics::film_w_m2_k(physics::air_film(reference::air_flow(ground_.setup, row)),
-                             {0.0, 0.0, 1.0}, ground_.setup.roughness, before_k - row.air_k);
+                             {0.0, 0.0, 1.0}, ground_.setup.skin, before_k - row.air_k);
     physics::FosterDrive<double> out{.absorbed_w_m2 = n.absorptance_frac * row.sun_w_m2 +
                                                       n.emissivity_frac * row.longwave_down_w_m2 -
                                                       row.evaporation_w_m2,

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 
+#include "emit/scene/melting.hpp"
 #include "tool/lab/spectra_report.hpp"
 #include "tool/support/console.hpp"
 
@@ -270,7 +271,7 @@ Plot day_plot(std::span<const MaterialEntry> entries, const std::string& family,
     const MaterialEntry& entry = entries[i];
     const Material& material = entry.material;
     PlotSeries series{.label = material.name, .points = {}, .line = true, .markers = false};
-    if (!material.dry_layers_valid) {
+    if (!material.dry_layers_valid || scene::is_snow_or_ice(material)) {
       series.dashed = true;
       plot.x.label = "local mean solar time, h; dashed: more than layers, a guide only";
     }
@@ -339,7 +340,7 @@ void print_materials(std::FILE* out, std::span<const MaterialEntry> entries) {
       const scene::MaterialSpread spread = m.spread.value_or(scene::MaterialSpread{});
       const bool layers = !m.layers.empty();
       const bool fitted = m.foster_fit.has_value();
-      table.add({"  " + m.name + (m.dry_layers_valid ? "" : " *"),
+      table.add({"  " + m.name + (m.dry_layers_valid && !scene::is_snow_or_ice(m) ? "" : " *"),
                  with_spread(m.solar_absorptance_frac, spread.solar_absorptance_frac),
                  with_spread(m.emissivity_frac, spread.emissivity_frac), band_text(m, "3-5"),
                  band_text(m, "8-12"),

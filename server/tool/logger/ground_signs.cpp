@@ -117,6 +117,10 @@ void add_signs_of_words(const LoggerRecord& record, const MeasuredGround& ground
     signs.push_back({"snow", fmt::format("the file speaks of '{}': snow melts and lets sun in, "
                                          "which dry layers do not",
                                          snow)});
+  } else if (scene::is_snow_or_ice(ground.material)) {
+    signs.push_back({"snow", fmt::format("material '{}' melts and lets sun in, which dry layers "
+                                         "do not",
+                                         ground.material.name)});
   }
   // Moist ground is computed as dry layers where the humidity of the air is not known.
   const bool holds = evaporates || scene::moisture_of(ground.material).dry();

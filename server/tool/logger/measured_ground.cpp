@@ -117,7 +117,7 @@ Result<MeasuredGround> measured_ground(const GroundOptions& options, LoggerRecor
   MeasuredGround out;
   out.material = std::move(*material);
   out.setup.layers = out.material.layers;
-  out.setup.roughness = scene::roughness_factor(out.material.roughness);
+  out.setup.skin = scene::film_skin(out.material);
   out.setup.height_m = record.height_m.value_or(0.0);
 
   out.numbers.emissivity_frac = options.emissivity_frac.value_or(out.material.emissivity_frac);

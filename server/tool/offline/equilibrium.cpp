@@ -37,8 +37,7 @@ double Equilibrium::at_k(std::size_t material, const renderer::SurfaceForcing& f
   const auto gain_w_m2 = [&](double t_k) {
     physics::FosterDrive<double> drive{
         .absorbed_w_m2 = absorbed_w_m2,
-        .film_w_m2_k =
-            physics::film_w_m2_k(forcing.film, face.normal, m.roughness, t_k - forcing.air_k),
+        .film_w_m2_k = physics::film_w_m2_k(forcing.film, face.normal, m.skin, t_k - forcing.air_k),
         .air_offset_k = 0.0};
     physics::add_moisture(moisture, forcing.moist, shortwave_w_m2, drive);
     return absorbed_w_m2 -

@@ -67,7 +67,7 @@ double natural_nusselt(double rayleigh, double normal_up, double length_m, doubl
   const AirFilm film = air_film(still, {.length_m = length_m});
   const double excess_k = rayleigh / (buoyancy(300.0) * by_m * by_m * by_m);
   const double conductivity = air_properties(300.0, 101'325.0).conductivity_w_m_k;
-  return natural_film_w_m2_k(film, normal_up, excess_k) * by_m / conductivity;
+  return natural_film_w_m2_k(film, {}, normal_up, excess_k) * by_m / conductivity;
 }
 
 Forcing wind(double speed_m_s) {
@@ -170,8 +170,10 @@ TEST(AirFilm, NaturalConvectionIsWithinTenPercentOfThePublishedOnes) {
   AirFlow still;
   still.air_k = 300.0;
   const AirFilm film = air_film(still);
-  EXPECT_DOUBLE_EQ(natural_film_w_m2_k(film, 0.7, 12.0), natural_film_w_m2_k(film, -0.7, -12.0));
-  EXPECT_GT(natural_film_w_m2_k(film, 1.0, 12.0), 2.0 * natural_film_w_m2_k(film, -1.0, 12.0));
+  EXPECT_DOUBLE_EQ(natural_film_w_m2_k(film, {}, 0.7, 12.0),
+                   natural_film_w_m2_k(film, {}, -0.7, -12.0));
+  EXPECT_GT(natural_film_w_m2_k(film, {}, 1.0, 12.0),
+            2.0 * natural_film_w_m2_k(film, {}, -1.0, 12.0));
 }
 
 TEST(AirFilm, SkinHeatsToTheRecoveryTemperature) {
@@ -237,9 +239,9 @@ TEST(AirFilm, WithoutADirectionItIsTheMeanOverAllOfThem) {
       const double from_rad = 2.0 * std::numbers::pi * (i + 0.5) / kDirections;
       weather.wind_to_east = std::sin(from_rad);
       weather.wind_to_north = std::cos(from_rad);
-      mean += forced_film_w_m2_k(air_film(air_flow(weather)), normal) / kDirections;
+      mean += forced_film_w_m2_k(air_film(air_flow(weather)), {}, normal) / kDirections;
     }
-    EXPECT_NEAR(forced_film_w_m2_k(unknown, normal) / mean, 1.0, 0.03) << tilt_deg;
+    EXPECT_NEAR(forced_film_w_m2_k(unknown, {}, normal) / mean, 1.0, 0.03) << tilt_deg;
   }
 }
 

@@ -334,9 +334,9 @@ double evaporated_mm(const reference::WaterCourse& course,
   const glm::dvec3 up(0.0, 0.0, 1.0);
   const auto rate_mm_s = [&](std::size_t i) {
     const reference::ClimateNode& node = nodes[i];
-    const double film_w_m2_k = physics::film_w_m2_k(physics::air_film(node.flow), up,
-                                                    scene::roughness_factor(material.roughness),
-                                                    course.face_k[i] - node.air_k);
+    const double film_w_m2_k =
+        physics::film_w_m2_k(physics::air_film(node.flow), up, scene::film_skin(material),
+                             course.face_k[i] - node.air_k);
     const double open_mm_s = 0.622 * film_w_m2_k / (1013.0 * node.flow.pressure_pa) *
                              (reference::saturation_pa(course.face_k[i]) - node.vapour_pa);
     if (open_mm_s < 0.0) return course.water_mm[i] > 0.0 ? open_mm_s : 0.0;

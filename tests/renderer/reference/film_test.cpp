@@ -127,4 +127,79 @@ TEST(Film, OfOpenWaterIsThatOfTheBulkFormula) {
   }
 }
 
+// Judges the film of one side of a leaf by two published ones. They differ by a factor of 1.8.
+TEST(Film, OfALeafLiesBetweenThePublishedOnes) {
+  for (const double width_m : {0.005, 0.02, 0.06, 0.2}) {
+    const physics::FilmSkin skin = physics::leaf_skin(width_m, 0.5);  // one side in all
+    for (const double wind_m_s : {0.5, 2.0, 8.0}) {
+      physics::AirFlow flow;
+      flow.air_k = 293.15;
+      flow.flow_m_s = {wind_m_s, 0.0, 0.0};
+      const double ours =
+          physics::film_w_m2_k(physics::air_film(flow), glm::dvec3(0.0, 0.0, 1.0), skin, 0.0);
+      // Campbell and Norman (1998): 1.4 x 0.135 mol m-2 s-1 (u/d)^1/2, d = 0.7 width, and 29.3 J
+      // mol-1 K-1. Leuning et al. (1995): 0.003 m/s (u/width)^1/2, without turbulence of the open.
+      const double inside_m_s = 0.7 * wind_m_s;
+      const double upper = 1.4 * 0.135 * 29.3 * std::sqrt(inside_m_s / (0.7 * width_m));
+      const double lower = 1204.0 * 0.003 * std::sqrt(inside_m_s / width_m);
+      EXPECT_NEAR(ours, upper, 0.04 * upper) << width_m << " m, " << wind_m_s << " m/s";
+      EXPECT_GT(ours, lower) << width_m << " m, " << wind_m_s << " m/s";
+      EXPECT_LT(upper, 1.9 * lower);
+    }
+    // Leuning et al. in still air: 0.5 D (1.6e8 width^3 dT)^1/4 / width, with D = 2.15e-5 m2/s.
+    physics::AirFlow still;
+    still.air_k = 293.15;
+    for (const double excess_k : {1.0, 5.0, -5.0}) {
+      const double ours =
+          physics::film_w_m2_k(physics::air_film(still), glm::dvec3(0.0, 1.0, 0.0), skin, excess_k);
+      const double theirs = 1204.0 * 0.5 * 2.15e-5 / width_m *
+                            std::pow(1.6e8 * std::pow(width_m, 3.0) * std::abs(excess_k), 0.25);
+      EXPECT_NEAR(ours, theirs, 0.25 * theirs) << width_m << " m, " << excess_k << " K";
+    }
+  }
+}
+
+// Leaves of well-watered trees in full sun were measured between the temperature of the air and 5 K
+// above it (Leuzinger and Koerner 2007; Scherrer et al. 2011), and needles closer to the air than
+// broad leaves. A closed surface in their place is far warmer.
+TEST(Film, KeepsLeavesWithinKelvinsOfTheAir) {
+  scene::ScenarioDesc s = calm_day(2.0);
+  const std::vector<std::int64_t> times_ns{10 * 60 * kMinuteNs, 22 * 60 * kMinuteNs};
+  reference::ClimateOptions options;
+  options.end_ns = times_ns.back();
+  const auto climate = reference::SurfaceClimate::create(s, options);
+  ASSERT_TRUE(climate.has_value());
+  scene::Material leaves = s.materials[0];
+  leaves.solar_absorptance_frac = 0.8;
+  leaves.emissivity_frac = 0.97;
+  leaves.layers = {{0.004, 0.15, 120.0, 3500.0}, {0.1, 0.1, 6.0, 2500.0}};
+  leaves.roughness = scene::Roughness::very_rough;
+  leaves.wetness_frac = 1.0;
+  leaves.surface_resistance_s_m = 100.0;
+  leaves.night_resistance_s_m = 1000.0;
+  const auto above_air_k = [&](double width_m) {
+    scene::Material material = leaves;
+    material.leaf_width_m = width_m;
+    const auto k =
+        reference::point_history(*climate, material, 290.0, {0.0, 0.0, 1.0}, {}, times_ns);
+    EXPECT_TRUE(k.has_value());
+    return std::pair((*k)[0] - climate->at(times_ns[0]).air_k,
+                     (*k)[1] - climate->at(times_ns[1]).air_k);
+  };
+  const auto [closed_k, closed_night_k] = above_air_k(0.0);
+  const auto [broad_k, broad_night_k] = above_air_k(0.06);
+  const auto [needle_k, needle_night_k] = above_air_k(0.01);
+  std::printf(
+      "above the air by day and night, K: closed %.2f %.2f, leaves %.2f %.2f, needles %.2f "
+      "%.2f\n",
+      closed_k, closed_night_k, broad_k, broad_night_k, needle_k, needle_night_k);
+  EXPECT_GT(broad_k, 0.3);
+  EXPECT_LT(broad_k, 5.0);
+  EXPECT_LT(needle_k, 0.7 * broad_k);
+  EXPECT_GT(closed_k, broad_k + 3.0);
+  EXPECT_LT(broad_night_k, 0.0);
+  EXPECT_GT(broad_night_k, -2.5);
+  EXPECT_GT(needle_night_k, broad_night_k);
+}
+
 }  // namespace

@@ -132,11 +132,11 @@ TEST(PointSolver, ShadowActsFromItsEdgeOnAndNotBefore) {
   // and radiation.
   const ClimateNode then = climate.at(edge);
   const double jump = 0.9 * then.direct_normal_w_m2 * then.to_sun.z;
-  const double roughness = scene::roughness_factor(scenario.materials[0].roughness);
+  const physics::FilmSkin skin = scene::film_skin(scenario.materials[0]);
   // The half space sees the slope of the convective flux, whose film falls as the face cools.
   const physics::AirFilm air = physics::air_film(then.flow);
   const auto lost_w_m2 = [&](double k) {
-    return physics::film_w_m2_k(air, kUp, roughness, k - then.air_k) * (k - then.air_k);
+    return physics::film_w_m2_k(air, kUp, skin, k - then.air_k) * (k - then.air_k);
   };
   const double convection_w_m2_k = (lost_w_m2(sun[1]) - lost_w_m2(shade[2])) / (sun[1] - shade[2]);
   const double film = convection_w_m2_k + 4.0 * 0.93 * sigma_t4(sun[1]) / sun[1];
@@ -240,18 +240,17 @@ TEST(PointSolver, SheetIsDrivenByBothOfItsFaces) {
   solver.run(-kUp, {down, up}, times, from_below);
   for (std::size_t i = 0; i < times.size(); ++i) {
     EXPECT_NEAR(from_above[i], from_below[i], 1e-4);
-    const double roughness = scene::roughness_factor(material.roughness);
+    const physics::FilmSkin skin = scene::film_skin(material);
     // Integrate the balance of both faces in steps of 0.1 s from an hour before.
     const auto net = [&](double now_s, double k) {
       const ClimateNode now = climate.at(static_cast<std::int64_t>(now_s * 1e9));
       const double rho = climate.surroundings_reflectance_frac();
       const ViewSample& lit = now_s < 9.0 * 3600.0 ? up[0] : up[2];
       const FaceState top = face_state(
-          now, {kUp, material.solar_absorptance_frac, material.emissivity_frac, roughness}, lit,
-          rho);
-      const FaceState bottom = face_state(
-          now, {-kUp, material.solar_absorptance_frac, material.emissivity_frac, roughness},
-          down[0], rho);
+          now, {kUp, material.solar_absorptance_frac, material.emissivity_frac, skin}, lit, rho);
+      const FaceState bottom =
+          face_state(now, {-kUp, material.solar_absorptance_frac, material.emissivity_frac, skin},
+                     down[0], rho);
       return top.absorbed_w_m2 + bottom.absorbed_w_m2 -
              2.0 * material.emissivity_frac * sigma_t4(k) +
              (top.film_at_w_m2_k(k) + bottom.film_at_w_m2_k(k)) * (now.air_k - k);

@@ -86,7 +86,7 @@ TEST(MeasuredPlate, constant_weather_ends_in_balance) {
   for (int i = 0; i < 60; ++i) {
     const double face_k = 0.5 * (low_k + high_k);
     const double film_w_m2_k =
-        0.8 * physics::film_w_m2_k(film, {0.0, 0.0, 1.0}, setup.roughness, face_k - 290.0);
+        0.8 * physics::film_w_m2_k(film, {0.0, 0.0, 1.0}, setup.skin, face_k - 290.0);
     const double flux_w_m2 = 0.7 * 400.0 + 0.94 * 320.0 -
                              0.94 * physics::kStefanBoltzmannWPerM2K4 * std::pow(face_k, 4.0) -
                              film_w_m2_k * (face_k - 290.0) - 1.3 * 0.5 / 0.02 * (face_k - 285.0);

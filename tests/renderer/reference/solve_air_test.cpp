@@ -123,8 +123,8 @@ TEST(ReferenceEntityAir, APanelThatStopsGoesBackAsItsFilmLetsIt) {
   for (const int after_s : {30, 300}) {
     for (; second < after_s; ++second) {
       const double excess_k = panel - kHighAirK;
-      const double mean_w_m2_k = 0.5 * (physics::natural_film_w_m2_k(film, 1.0, excess_k) +
-                                        physics::natural_film_w_m2_k(film, -1.0, excess_k));
+      const double mean_w_m2_k = 0.5 * (physics::natural_film_w_m2_k(film, {}, 1.0, excess_k) +
+                                        physics::natural_film_w_m2_k(film, {}, -1.0, excess_k));
       panel -= mean_w_m2_k * excess_k / kFaceJ_m2_k;
     }
     const std::int64_t now_ns = (static_cast<std::int64_t>(kFlownS) + after_s) * kSecondNs;

@@ -86,9 +86,9 @@ double balance_k(const scene::ScenarioDesc& s, std::int64_t end_ns) {
   const double capacity = kSteel.thickness_m * kSteel.density_kg_m3 * kSteel.specific_heat_j_kg_k;
   const auto both_films_w_m2_k = [&m](const renderer::SurfaceForcing& f, double k) {
     const glm::dvec3 up(0.0, 0.0, 1.0);
-    const double roughness = scene::roughness_factor(m.roughness);
-    return physics::film_w_m2_k(f.film, up, roughness, k - f.air_k) +
-           physics::film_w_m2_k(f.film, -up, roughness, k - f.air_k);
+    const physics::FilmSkin skin = scene::film_skin(m);
+    return physics::film_w_m2_k(f.film, up, skin, k - f.air_k) +
+           physics::film_w_m2_k(f.film, -up, skin, k - f.air_k);
   };
   double t_k = 300.0;  // has no influence after the first of two hours
   for (const renderer::IntervalForcing& interval : *intervals) {

@@ -185,6 +185,25 @@ TEST(RendererCachedWeather, FramesSayThatNobodyKnowsWhatRainDoes) {
   EXPECT_TRUE(unknown(2 * kHourNs + 10 * kSecondNs));
 }
 
+TEST(RendererCachedWeather, FramesSayThatAMaterialIsMoreThanDryLayers) {
+  for (const auto method : {scene::ThermalMethod::cached, scene::ThermalMethod::per_frame}) {
+    for (const bool valid : {true, false}) {
+      auto scenario = open_ground();
+      scenario.thermal.method = method;
+      for (scene::Material& material : scenario.materials) material.dry_layers_valid = valid;
+      auto made = renderer::Renderer::create(scenario, {}, renderer::OutputOptions{});
+      ASSERT_TRUE(made) << made.error().text;
+      renderer::FrameRequest request;
+      request.sim_time_ns = request.thermal_time_ns = 2 * kHourNs;
+      request.sensor_pose = looking({0.0, -0.01, 12.0}, {0.0, 0.0, 0.0});
+      const auto slot = static_cast<renderer::SlotIndex>((*made)->submit(request));
+      EXPECT_EQ(renderer::has((*made)->collect(slot).stats.heat_limits,
+                              renderer::HeatLimit::layers_invalid),
+                !valid);
+    }
+  }
+}
+
 TEST(RendererCachedWeather, FramesSayWhileSomeSurfacesDoNotKnowYet) {
   const auto scenario = open_ground();
   const auto pose = looking({0.0, -0.01, 12.0}, {0.0, 0.0, 0.0});

@@ -127,6 +127,27 @@ TEST(RendererFoster, MoistGroundFollowsTheModelInDoubleAndIsCoolerThanDry) {
   }
 }
 
+TEST(RendererFoster, LeavesFollowTheModelInDoubleAndStayNearTheAir) {
+  auto scenario = foster_scenario(write_quads("plane", {ground(50.0, 50.0)}));
+  scenario.materials[0].layers = {{0.004, 0.15, 120, 3500}, {0.1, 0.1, 6, 2500}};
+  const auto pose = looking({0.0, -5.0, 5.0}, {0.0, 0.0, 0.0});
+  for (const double hours : {0.0, 3.5}) {
+    const auto now_ns = static_cast<std::int64_t>(hours * static_cast<double>(kHourNs));
+    scenario.materials[0].leaf_width_m = 0.0;
+    const double closed_k = expected_k(scenario, now_ns, {0.0, 0.0, 1.0});
+    scenario.materials[0].leaf_width_m = 0.05;
+    const double expected = expected_k(scenario, now_ns, {0.0, 0.0, 1.0});
+    double worst_k = 0.0;
+    for (const float t : render_k(scenario, pose, now_ns)) {
+      worst_k = std::max(worst_k, std::abs(t - expected));
+    }
+    EXPECT_LT(worst_k, 0.01) << hours << " h";
+    if (hours == 3.5) {
+      EXPECT_LT(expected, closed_k - 5.0);
+    }
+  }
+}
+
 TEST(RendererFoster, RainedOnGroundFollowsTheModelInDouble) {
   auto scenario = foster_scenario(write_quads("plane", {ground(50.0, 50.0)}));
   scenario.materials[0].water_store_mm = 0.48;

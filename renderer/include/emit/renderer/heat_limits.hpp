@@ -23,8 +23,9 @@ enum class HeatLimit : std::uint8_t {
   humidity_unknown,  ///< moist ground in weather that does not state the humidity
   strong_wind,       ///< wind beyond the measurements of the film
   longwave_low,      ///< less long-wave irradiance than any sky sends: a gap in the weather
+  layers_invalid,    ///< a material whose heat moves by more than layers of it can say
 };
-inline constexpr std::size_t kHeatLimits = 8;
+inline constexpr std::size_t kHeatLimits = 9;
 /// Limits that were passed, by number.
 using HeatLimits = std::bitset<kHeatLimits>;
 
@@ -38,8 +39,8 @@ inline void add(HeatLimits& limits, HeatLimit which) noexcept {
 /// Returns the name of a limit in outputs, such as "freezing".
 [[nodiscard]] constexpr std::string_view name_of(HeatLimit which) noexcept {
   constexpr std::array<std::string_view, kHeatLimits> kNames{
-      "rain_unknown", "rain_shelter",     "snowfall",    "freezing",
-      "melting",      "humidity_unknown", "strong_wind", "longwave_low"};
+      "rain_unknown",     "rain_shelter", "snowfall",     "freezing",      "melting",
+      "humidity_unknown", "strong_wind",  "longwave_low", "layers_invalid"};
   return kNames[static_cast<std::size_t>(which)];
 }
 /// Returns a sentence about a limit, without a full stop, of at most 85 bytes.
@@ -52,7 +53,8 @@ inline void add(HeatLimits& limits, HeatLimit which) noexcept {
       "snow or ice is above 0 C: melting takes no heat here, so that it is too warm",
       "the weather lacks the humidity that moist ground needs: 60 % at the mean air counts",
       "the wind is above 20 m/s, beyond the measurements of the air film",
-      "the weather's long-wave irradiance is below 0.4 of a black sky's: it may be a gap"};
+      "the weather's long-wave irradiance is below 0.4 of a black sky's: it may be a gap",
+      "a material states dry_layers_valid = false: its temperatures are a guide only"};
   return kTexts[static_cast<std::size_t>(which)];
 }
 

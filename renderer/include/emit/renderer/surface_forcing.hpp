@@ -77,7 +77,7 @@ struct FosterMaterial {
   /// Nobody has stated initial_k: the surface begins in the balance of its own first day.
   bool starts_balanced = false;
   double prescribed_k = 0.0;
-  double roughness = 1.0;          ///< factor of the forced part of the film (physics.md eq. 34)
+  physics::FilmSkin skin;          ///< what the film of the air takes from it
   physics::MoistSurface moisture;  ///< exchange of water with the air
   physics::WaterStore store;       ///< room for rain water
   int water_slot = -1;             ///< of SurfaceForcing::wet_frac; -1: it holds no water

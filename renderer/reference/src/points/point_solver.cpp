@@ -207,11 +207,10 @@ BalancedStart PointSolver::start_of(const SurfaceOptics& surface, const Views& v
 }
 
 double PointSolver::balanced_mean_k(const glm::dvec3& normal) {
-  return start_of(
-             SurfaceOptics{normal, material_->solar_absorptance_frac, material_->emissivity_frac,
-                           scene::roughness_factor(material_->roughness), false,
-                           scene::moisture_of(*material_), rain_ != nullptr},
-             {}, climate_->start_ns())
+  return start_of(SurfaceOptics{normal, material_->solar_absorptance_frac,
+                                material_->emissivity_frac, scene::film_skin(*material_), false,
+                                scene::moisture_of(*material_), rain_ != nullptr},
+                  {}, climate_->start_ns())
       .mean_k;
 }
 
@@ -286,7 +285,7 @@ void PointSolver::run(const glm::dvec3& normal, const Views& views,
   const SurfaceOptics surface{rest ? rest->normal : normal,
                               material_->solar_absorptance_frac,
                               material_->emissivity_frac,
-                              scene::roughness_factor(material_->roughness),
+                              scene::film_skin(*material_),
                               material_->sheet,
                               scene::moisture_of(*material_),
                               rain_ != nullptr,

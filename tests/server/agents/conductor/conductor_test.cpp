@@ -103,10 +103,10 @@ TEST(RenderAgent, FramesOfASurfaceThatIsTooCoarseAreDegradedAndCountedByReasonAn
 }
 
 TEST(RenderAgent, EachLimitOfTheHeatIsCountedByItsNameAndToldOnceInARun) {
-  const Counter counters[] = {Counter::frames_wet_unknown, Counter::frames_rain_shelter,
-                              Counter::frames_snowfall,    Counter::frames_freezing,
-                              Counter::frames_melting,     Counter::frames_humidity_unknown,
-                              Counter::frames_strong_wind, Counter::frames_longwave_low};
+  const Counter counters[] = {
+      Counter::frames_wet_unknown, Counter::frames_rain_shelter, Counter::frames_snowfall,
+      Counter::frames_freezing,    Counter::frames_melting,      Counter::frames_humidity_unknown,
+      Counter::frames_strong_wind, Counter::frames_longwave_low, Counter::frames_layers_invalid};
   ASSERT_EQ(std::size(counters), renderer::kHeatLimits);
   for (std::size_t i = 0; i < renderer::kHeatLimits; ++i) {
     SCOPED_TRACE(i);

@@ -8,8 +8,8 @@
 
 #include "emit/physics/weather.hpp"
 
-/// Exchange of heat between surfaces and the air (physics.md section 8, eq. 31 to 36). Raw SI
-/// numbers. Any thread. RT-safe. shaders/lib/air_film.glsl is the float32 twin of film_w_m2_k().
+/// Exchange of heat between surfaces and the air (physics.md section 8, eq. 31 to 36 and 90). Raw
+/// SI numbers. Any thread. RT-safe. shaders/lib/air_film.glsl is the float32 twin of film_w_m2_k().
 namespace emit::physics {
 
 /// Properties of dry air.
@@ -70,7 +70,9 @@ struct AirFilm {
   double unstable_quarter = 0.0;
   double unstable_third = 0.0;
   double stable_quarter = 0.0;
-  double rough_frac = 0.0;  ///< share of the roughness of a material that counts, 0..1
+  double leaf_forced = 0.0;   ///< forced part on one side of a leaf of 1 m; times length^-1/2
+  double leaf_quarter = 0.0;  ///< its natural part at 1 K; times (|dT|/length)^1/4
+  double rough_frac = 0.0;    ///< share of the roughness of a material that counts, 0..1
   /// Film that the user gave, multiplied by its share, and share of the model in the rest.
   double stated_w_m2_k = 0.0;
   double model_frac = 1.0;
@@ -84,6 +86,24 @@ struct AirFilm {
 }
 /// Returns the film between `a` (f = 0) and `b` (f = 1), linear in every coefficient.
 [[nodiscard]] AirFilm between_films(const AirFilm& a, const AirFilm& b, double f) noexcept;
+
+/// What the film of a face takes from its material.
+struct FilmSkin {
+  /// A number is the factor R of physics.md eq. 34: 1 for a smooth face.
+  constexpr FilmSkin(double roughness_factor = 1.0) noexcept : roughness(roughness_factor) {}
+
+  double roughness = 1.0;
+  /// Leaves (physics.md eq. 90): area of their sides by that of the face, by length^-1/2 and
+  /// length^-1/4. Zero for a face without leaves.
+  double leaf_forced = 0.0;
+  double leaf_natural = 0.0;
+
+  [[nodiscard]] constexpr bool leafy() const noexcept { return leaf_forced > 0.0; }
+  bool operator==(const FilmSkin&) const = default;
+};
+/// Returns the skin of leaves, needles or strips of a width in metres, of which a square metre of
+/// face has an area `area_index` (one side). @pre both > 0
+[[nodiscard]] FilmSkin leaf_skin(double width_m, double area_index) noexcept;
 
 /// Air and flow relative to a body, from which its film follows.
 struct AirFlow {
@@ -111,14 +131,15 @@ struct AirFlow {
 /// Returns the film coefficient of a level, medium rough face 10 K above the air, for estimates.
 [[nodiscard]] double typical_film_w_m2_k(const Forcing& weather) noexcept;
 
-/// Returns the natural part of the film of a face, W m-2 K-1 (physics.md eq. 31 and 32).
+/// Returns the natural part of the film of a face, W m-2 K-1 (physics.md eq. 31, 32 and 90).
 /// `normal_up` is the vertical component of the unit normal, `excess_k` the temperature of the face
 /// above the air.
-[[nodiscard]] inline double natural_film_w_m2_k(const AirFilm& film, double normal_up,
-                                                double excess_k) noexcept {
+[[nodiscard]] inline double natural_film_w_m2_k(const AirFilm& film, const FilmSkin& skin,
+                                                double normal_up, double excess_k) noexcept {
   const double size_k = std::abs(excess_k);
-  const double third = std::cbrt(size_k);
   const double quarter = std::sqrt(std::sqrt(size_k));
+  if (skin.leafy()) return skin.leaf_natural * film.leaf_quarter * quarter;
+  const double third = std::cbrt(size_k);
   const double root = film.vertical_root + film.vertical_rise * std::sqrt(third);
   const double vertical = root * root;
   const double level_frac = std::min(std::abs(normal_up), 1.0);
@@ -131,9 +152,11 @@ struct AirFlow {
   return vertical + (level - vertical) * 2.382 * level_frac / (1.382 + level_frac);
 }
 
-/// Returns the forced part on a smooth face of that unit normal, W m-2 K-1 (physics.md eq. 33).
-[[nodiscard]] inline double forced_film_w_m2_k(const AirFilm& film,
+/// Returns the forced part on a smooth face of that unit normal, or on its leaves, W m-2 K-1
+/// (physics.md eq. 33 and 90).
+[[nodiscard]] inline double forced_film_w_m2_k(const AirFilm& film, const FilmSkin& skin,
                                                const glm::dvec3& normal) noexcept {
+  if (skin.leafy()) return skin.leaf_forced * film.leaf_forced;
   // Take the share of the windward side: with the direction of the flow, and as its mean over all
   // directions around the vertical.
   const double facing_frac = std::clamp(1.0 + 5.0 * glm::dot(normal, film.upwind), 0.0, 1.0);
@@ -143,11 +166,11 @@ struct AirFlow {
   return film.leeward_w_m2_k + windward_frac * (film.windward_w_m2_k - film.leeward_w_m2_k);
 }
 
-/// Joins both parts (physics.md eq. 34) with what the user gave. `roughness` is 1 for a smooth
-/// face.
-[[nodiscard]] inline double joined_film_w_m2_k(const AirFilm& film, double natural_w_m2_k,
-                                               double forced_w_m2_k, double roughness) noexcept {
-  const double rough = 1.0 + film.rough_frac * (roughness - 1.0);
+/// Joins both parts (physics.md eq. 34) with what the user gave.
+[[nodiscard]] inline double joined_film_w_m2_k(const AirFilm& film, const FilmSkin& skin,
+                                               double natural_w_m2_k,
+                                               double forced_w_m2_k) noexcept {
+  const double rough = 1.0 + film.rough_frac * (skin.roughness - 1.0);
   const double model_w_m2_k =
       natural_w_m2_k +
       rough * (std::sqrt(natural_w_m2_k * natural_w_m2_k + forced_w_m2_k * forced_w_m2_k) -
@@ -156,11 +179,11 @@ struct AirFlow {
 }
 
 /// Returns the film coefficient of a face, W m-2 K-1. `normal` is its unit normal in world axes (z
-/// up), `roughness` the factor of its material, `excess_k` its temperature above the air.
+/// up), `skin` what its material gives, `excess_k` its temperature above the air.
 [[nodiscard]] inline double film_w_m2_k(const AirFilm& film, const glm::dvec3& normal,
-                                        double roughness, double excess_k) noexcept {
-  return joined_film_w_m2_k(film, natural_film_w_m2_k(film, normal.z, excess_k),
-                            forced_film_w_m2_k(film, normal), roughness);
+                                        const FilmSkin& skin, double excess_k) noexcept {
+  return joined_film_w_m2_k(film, skin, natural_film_w_m2_k(film, skin, normal.z, excess_k),
+                            forced_film_w_m2_k(film, skin, normal));
 }
 
 }  // namespace emit::physics

@@ -16,14 +16,13 @@ namespace emit::reference {
 struct FaceFilm {
   physics::AirFilm air;
   glm::dvec3 normal{0.0, 0.0, 1.0};
-  double roughness = 1.0;
+  physics::FilmSkin skin;
   bool both_sides = false;  ///< the mean of this normal and the opposite one
 
   /// Returns the film coefficient of a face that much warmer than the air.
   [[nodiscard]] double at_w_m2_k(double excess_k) const noexcept {
-    const double front = physics::film_w_m2_k(air, normal, roughness, excess_k);
-    return both_sides ? 0.5 * (front + physics::film_w_m2_k(air, -normal, roughness, excess_k))
-                      : front;
+    const double front = physics::film_w_m2_k(air, normal, skin, excess_k);
+    return both_sides ? 0.5 * (front + physics::film_w_m2_k(air, -normal, skin, excess_k)) : front;
   }
 };
 

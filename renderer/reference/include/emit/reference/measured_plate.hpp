@@ -40,7 +40,7 @@ struct PlateNumbers {
 /// Ground and place that do not change in a fit.
 struct PlateSetup {
   std::vector<scene::Layer> layers;  ///< outermost first
-  double roughness = 1.52;           ///< factor of scene::roughness_factor()
+  physics::FilmSkin skin = 1.52;     ///< what the film of the air takes from the ground
   double height_m = 0.0;             ///< of the place above the sea; sets the air's density
   physics::MoistSurface moisture;    ///< exchange of water with the air; dry unless stated
   /// Number of times that the first day is repeated before the record. The profile begins steady

@@ -23,7 +23,7 @@ struct ExchangeFace {
   double area_m2 = 0.0;
   double solar_absorptance_frac = 0.0;
   double emissivity_frac = 0.0;
-  double roughness = 1.0;  ///< factor of the forced part of the film
+  physics::FilmSkin skin;  ///< what the film of the air takes from the material
   bool enclosed = false;   ///< the face looks into a closed cavity: it gets no rays and no sky
 };
 

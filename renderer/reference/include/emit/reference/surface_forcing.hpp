@@ -128,8 +128,8 @@ struct SurfaceOptics {
   glm::dvec3 normal{0.0, 0.0, 1.0};
   double solar_absorptance_frac = 0.0;
   double emissivity_frac = 0.0;
-  double roughness = 1.0;   ///< factor of the forced part of the film
-  bool both_sides = false;  ///< the film is the mean of both faces of a sheet
+  physics::FilmSkin skin = {};  ///< what the film of the air takes from the material
+  bool both_sides = false;      ///< the film is the mean of both faces of a sheet
   physics::MoistSurface moisture = {};
   bool holds_water = false;             ///< rain wets it
   physics::AirFilmBody film_body = {};  ///< shape and length of the flow

@@ -109,7 +109,7 @@ enum class Roughness : std::uint8_t {
   very_smooth,    ///< glass, polished metal
   open_water,     ///< pond, lake, sea
 };
-/// Returns the factor R of physics.md eq. 34.
+/// Returns the factor R of physics.md eq. 34 of a class.
 [[nodiscard]] constexpr double roughness_factor(Roughness roughness) noexcept {
   constexpr std::array<double, 7> kFactors{2.17, 1.67, 1.52, 1.13, 1.11, 1.0, 0.55};
   return kFactors[static_cast<std::size_t>(roughness)];
@@ -130,10 +130,14 @@ struct Material {
   double solar_absorptance_frac = 0.0;            ///< absorbed share of sunlight: 1 - albedo
   double emissivity_frac = 0.0;                   ///< total hemispherical, long-wave
   Roughness roughness = Roughness::medium_rough;  ///< as the wind feels it; emit2014 ignores it
-  std::vector<BandEmissivity> band_emissivity;    ///< bands not listed use emissivity_frac
-  EmissivitySpectrum emissivity_spectrum;         ///< source of both; may be empty
-  std::vector<Layer> layers;                      ///< outermost first; emit2014 uses the first only
-  BaseKind base = BaseKind::room;                 ///< what the last layer rests on
+  /// Width of the leaves, needles or strips of which the surface consists; 0: it is closed.
+  double leaf_width_m = 0.0;
+  /// Area of leaves, one side, by that of the surface.
+  double leaf_area_index = 2.0;
+  std::vector<BandEmissivity> band_emissivity;  ///< bands not listed use emissivity_frac
+  EmissivitySpectrum emissivity_spectrum;       ///< source of both; may be empty
+  std::vector<Layer> layers;                    ///< outermost first; emit2014 uses the first only
+  BaseKind base = BaseKind::room;               ///< what the last layer rests on
   /// Temperature under the last layer. resolve_bases() fills it unless the user states it.
   double base_k = 0.0;
   bool base_stated = false;  ///< base_k is the user's own number
@@ -190,6 +194,14 @@ struct Material {
   return {.wetness_frac = material.wetness_frac.value_or(1.0),
           .resistance_s_m = resistance_s_m,
           .night_resistance_s_m = material.night_resistance_s_m.value_or(resistance_s_m)};
+}
+
+/// Returns what the film of the air takes from a material.
+[[nodiscard]] inline physics::FilmSkin film_skin(const Material& material) noexcept {
+  if (material.leaf_width_m > 0.0) {
+    return physics::leaf_skin(material.leaf_width_m, material.leaf_area_index);
+  }
+  return roughness_factor(material.roughness);
 }
 
 /// Returns the room for rain water of a material; none if it states none or has a prescribed
