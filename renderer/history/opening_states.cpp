@@ -25,9 +25,15 @@ constexpr int kMostDays = 12;
 FosterDrive<double> face_drive(const SurfaceForcing& f, const FosterMaterial& material, double up,
                                double sun_share, double sky_frac, double reference_k,
                                double offset_k) noexcept {
+  // What hides the sky above the horizon stands in its own shade: it sends no sunlight, and is as
+  // warm as the air.
+  const double ground_frac = std::min(1.0 - sky_frac, 0.5 * (1.0 - up));
   const double short_wave_w_m2 = sun_share * glm::length(f.sun_w_m2) + sky_frac * f.diffuse_w_m2 +
-                                 (1.0 - sky_frac) * f.reflected_w_m2;
-  const double long_wave_w_m2 = sky_frac * f.longwave_w_m2 + (1.0 - sky_frac) * f.environment_w_m2;
+                                 ground_frac * f.reflected_w_m2;
+  const double air2 = f.air_k * f.air_k;
+  const double long_wave_w_m2 =
+      sky_frac * f.longwave_w_m2 + ground_frac * f.environment_w_m2 +
+      (1.0 - sky_frac - ground_frac) * physics::kStefanBoltzmannWPerM2K4 * air2 * air2;
   const double side = std::sqrt(std::max(0.0, 1.0 - up * up));
   const double excess_k = reference_k + offset_k - f.air_k;
   const auto film = [&](double east, double north) {

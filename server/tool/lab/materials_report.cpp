@@ -18,8 +18,8 @@ using scene::Material;
 
 constexpr double kZeroCelsiusK = 273.15;
 constexpr double kHourS = 3600.0;
-constexpr std::array<const char*, 6> kRoughnesses{"very rough",    "rough",  "medium rough",
-                                                  "medium smooth", "smooth", "very smooth"};
+constexpr std::array<const char*, scene::kRoughnesses> kRoughnesses{
+    "very rough", "rough", "medium rough", "medium smooth", "smooth", "very smooth", "open water"};
 constexpr std::array<const char*, 4> kBases{"ground", "air", "room", "body"};
 
 constexpr std::array<const char*, 4> kBands{"3-5", "3.4-4.1", "8-12", "7.7-9.3"};
@@ -155,7 +155,11 @@ void add_rows(TextTable& table, std::span<const MaterialEntry> entries) {
   }
   row("  spectrum", [](const MaterialEntry& e) { return spectrum_text(e.material); });
   row("roughness", [](const MaterialEntry& e) {
-    return std::string(kRoughnesses.at(static_cast<std::size_t>(e.material.roughness)));
+    const Material& m = e.material;
+    if (m.leaf_width_m > 0.0) {
+      return fmt::format("leaves {:.3g} m, x {:g}", m.leaf_width_m, m.leaf_area_index);
+    }
+    return std::string(kRoughnesses.at(static_cast<std::size_t>(m.roughness)));
   });
   layer_row("base", [](const Material& m) {
     const std::string kind = kBases.at(static_cast<std::size_t>(m.base));

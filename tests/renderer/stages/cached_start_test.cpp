@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Thick ground under a roof begins in the balance of its own shade. The reference judges that with
-// fifty days of shaded history from a stated temperature: it shares neither the start nor the
-// assumption that the days before the history were like its first one.
+// Thick ground under a roof begins in the balance of its own shade. A hundred days of shaded history
+// from a stated temperature judge that: they share the steps of the history, but neither the start
+// nor the assumption that the days before were like the first one.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstdio>
 #include <vector>
 
-#include "emit/reference/solve.hpp"
-#include "emit/scene/mesh.hpp"
 #include "support/cached_session.hpp"
 #include "support/renderer_scene.hpp"
 
@@ -40,39 +38,35 @@ scene::ScenarioDesc roof_on_thick_ground() {
   return s;
 }
 
+/// Temperatures of the places.
+std::vector<double> rendered_k(const scene::ScenarioDesc& s, std::int64_t now_ns) {
+  Session session(s);
+  (void)session.frame_k(now_ns, looking({0.0, -16.0, 9.0}, {0.0, 0.0, 0.0}));
+  std::vector<double> out;
+  for (const StartPlace& place : kStartPlaces) {
+    const auto sample =
+        session.renderer().nearest_sample({place.position_m, glm::dvec3(0.0, 0.0, 1.0)});
+    EXPECT_TRUE(sample.has_value()) << place.name;
+    out.push_back(sample ? session.renderer().sample_reading(*sample).temperature_k : 0.0);
+  }
+  return out;
+}
+
 TEST(RendererStart, ThickGroundHasKnownItsShadeForWeeks) {
   scene::ScenarioDesc s = roof_on_thick_ground();
   scene::ScenarioDesc weeks = s;
-  weeks.thermal.spin_up_ns = kSecondNs;
+  weeks.thermal.history_start_ns = -2400 * kHourNs;
+  weeks.thermal.steps = 400;
   s.thermal.initial_stated = false;
-  const std::int64_t times_ns[] = {4 * kHourNs, 14 * kHourNs};
-  const auto geometry = scene::load_scene(weeks);
-  ASSERT_TRUE(geometry.has_value());
-  reference::SolveOptions options;
-  options.dimension = reference::SolveDimension::one;
-  options.rays = 128;
-  options.spin_up_s = 50.0 * 86'400.0;
-  auto solver = reference::SceneSolver::create(weeks, *geometry, options, times_ns[1]);
-  ASSERT_TRUE(solver.has_value()) << solver.error().text;
-  std::vector<reference::SolveProbe> probes;
-  for (const StartPlace& place : kStartPlaces) {
-    probes.push_back({place.position_m, glm::dvec3(0.0, 0.0, 1.0), ""});
-  }
-  for (const std::int64_t now_ns : times_ns) {
-    Session session(s);
-    (void)session.frame_k(now_ns, looking({0.0, -16.0, 9.0}, {0.0, 0.0, 0.0}));
-    const auto truth = solver->probe(probes, now_ns);
-    ASSERT_TRUE(truth.has_value()) << truth.error().text;
+  for (const std::int64_t now_ns : {4 * kHourNs, 14 * kHourNs}) {
+    const std::vector<double> is_k = rendered_k(s, now_ns);
+    const std::vector<double> weeks_k = rendered_k(weeks, now_ns);
     for (std::size_t i = 0; i < std::size(kStartPlaces); ++i) {
-      const auto sample = session.renderer().nearest_sample(
-          {kStartPlaces[i].position_m, glm::dvec3(0.0, 0.0, 1.0)});
-      ASSERT_TRUE(sample.has_value()) << kStartPlaces[i].name;
-      const double is_k = session.renderer().sample_reading(*sample).temperature_k;
-      const double true_k = (*truth)[i].temperature_k;
-      std::printf("%2lld h, %-21s %.2f K, reference %.2f K, off %+.2f K\n",
-                  static_cast<long long>(now_ns / kHourNs), kStartPlaces[i].name, is_k, true_k,
-                  is_k - true_k);
-      EXPECT_NEAR(is_k, true_k, 0.4) << kStartPlaces[i].name << ", " << now_ns / kHourNs << " h";
+      const double off_k = is_k[i] - weeks_k[i];
+      std::printf("%2lld h, %-21s %.2f K, after weeks %.2f K, off %+.2f K\n",
+                  static_cast<long long>(now_ns / kHourNs), kStartPlaces[i].name, is_k[i],
+                  weeks_k[i], off_k);
+      EXPECT_LT(std::abs(off_k), 0.3) << kStartPlaces[i].name << ", " << now_ns / kHourNs << " h";
     }
   }
 }

@@ -40,7 +40,7 @@ TEST(CliMaterials, lists_the_shipped_library_by_family_with_its_uncertainty) {
   const TemporaryFolder folder;
   const ProcessResult result = run_emit({"materials", "--json", folder.file("m.json")});
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  for (const char* text : {"roofing:", "vegetation:", "vehicle_black", "0.93 +-0.05", "water *"}) {
+  for (const char* text : {"roofing:", "vegetation:", "vehicle_black", "0.93 +-0.05", "snow_old *"}) {
     EXPECT_NE(result.out.find(text), std::string::npos) << text << "\n" << result.out;
   }
   const std::string json = read_text(folder.file("m.json"));
@@ -66,6 +66,24 @@ TEST(CliMaterials, compares_a_black_and_a_white_panel_over_a_summers_day) {
   const std::string svg = read_text(folder.file("m.svg"));
   EXPECT_NE(svg.find("paint: emissivity by band"), std::string::npos);
   EXPECT_NE(svg.find("temperate_summer"), std::string::npos);
+}
+
+TEST(CliMaterials, every_material_of_the_library_can_be_shown) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(run_emit({"materials", "--json", folder.file("m.json")}).exit_code, 0);
+  const std::string json = read_text(folder.file("m.json"));
+  std::vector<std::string> command{"materials"};
+  const std::string key = "\"name\": \"";
+  for (auto at = json.find(key); at != std::string::npos; at = json.find(key, at + 1)) {
+    const auto begin = at + key.size();
+    command.push_back(json.substr(begin, json.find('"', begin) - begin));
+  }
+  ASSERT_GT(command.size(), 60U);
+  const ProcessResult result = run_emit(command);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  for (const char* text : {"open water", "leaves 0.06 m, x 2", "snow_old"}) {
+    EXPECT_NE(result.out.find(text), std::string::npos) << text;
+  }
 }
 
 TEST(CliMaterials, a_family_is_shown_by_its_name) {

@@ -109,9 +109,10 @@ enum class Roughness : std::uint8_t {
   very_smooth,    ///< glass, polished metal
   open_water,     ///< pond, lake, sea
 };
+inline constexpr std::size_t kRoughnesses = 7;
 /// Returns the factor R of physics.md eq. 34 of a class.
 [[nodiscard]] constexpr double roughness_factor(Roughness roughness) noexcept {
-  constexpr std::array<double, 7> kFactors{2.17, 1.67, 1.52, 1.13, 1.11, 1.0, 0.55};
+  constexpr std::array<double, kRoughnesses> kFactors{2.17, 1.67, 1.52, 1.13, 1.11, 1.0, 0.55};
   return kFactors[static_cast<std::size_t>(roughness)];
 }
 
