@@ -248,7 +248,7 @@ std::vector<FosterMaterial> with_surroundings(std::vector<FosterMaterial> materi
 FosterHistory::FosterHistory(const scene::ScenarioDesc& scenario,
                              std::vector<FosterMaterial> materials, FosterMaterial surroundings,
                              const Environment& environment, double reference_k,
-                             DryGrounds dry_grounds)
+                             DryGrounds dry_grounds, StartNodes start_nodes)
     : materials_(std::move(materials)),
       surroundings_(surroundings),
       reference_k_(reference_k),
@@ -258,6 +258,7 @@ FosterHistory::FosterHistory(const scene::ScenarioDesc& scenario,
       surroundings_surface_(foster_surface_of(surroundings_, reference_k)),
       grounds_(with_surroundings(materials_, surroundings_), reference_k, tolerance_k_),
       dry_grounds_(dry_grounds),
+      start_nodes_(start_nodes),
       intervals_(scenario.thermal.steps) {
   if (spin_up_ns_ > 0) tail_.resize(kTailSteps);
   if (spin_up_ns_ > kTailNs) {
@@ -399,18 +400,34 @@ FosterState<double> FosterHistory::start_states(std::size_t material,
   const glm::dvec2 low = glm::clamp(glm::floor(place), glm::dvec2(0.0),
                                     glm::dvec2(static_cast<double>(grid_nodes_ - 2)));
   const glm::dvec2 weight = place - low;
-  const std::size_t at = (material * grid_nodes_ + static_cast<std::size_t>(low.y)) * grid_nodes_ +
-                         static_cast<std::size_t>(low.x);
+  const auto row = static_cast<std::size_t>(low.y);
+  const auto column = static_cast<std::size_t>(low.x);
+  const std::array<StateTexels, 2> south{node(material, row, column),
+                                         node(material, row, column + 1)};
+  const std::array<StateTexels, 2> north{node(material, row + 1, column),
+                                         node(material, row + 1, column + 1)};
   FosterState<double> x{};
   for (std::size_t i = 0; i < x.size(); ++i) {
-    const auto state = [&](std::size_t node) {
-      return static_cast<double>(table_[node][i / 4][static_cast<glm::length_t>(i % 4)]);
+    const auto between = [&](const std::array<StateTexels, 2>& nodes) {
+      const auto state = [i](const StateTexels& texels) {
+        return static_cast<double>(texels[i / 4][static_cast<glm::length_t>(i % 4)]);
+      };
+      return glm::mix(state(nodes[0]), state(nodes[1]), weight.x);
     };
-    const double south = glm::mix(state(at), state(at + 1), weight.x);
-    const double north = glm::mix(state(at + grid_nodes_), state(at + grid_nodes_ + 1), weight.x);
-    x[i] = glm::mix(south, north, weight.y);
+    x[i] = glm::mix(between(south), between(north), weight.y);
   }
   return x;
+}
+
+StateTexels FosterHistory::node(std::size_t material, std::size_t row,
+                                std::size_t column) const noexcept {
+  return table_.at((material * grid_nodes_ + row) * grid_nodes_ + column, [&] {
+    if (materials_[material].prescribed()) return StateTexels{};
+    const double scale = 2.0 / (grid_nodes_ - 1);
+    return texels_of(
+        spun_up(material, unit_from_octahedral(scale * static_cast<double>(column) - 1.0,
+                                               scale * static_cast<double>(row) - 1.0)));
+  });
 }
 
 FosterState<double> FosterHistory::first_states(std::size_t material,
@@ -477,18 +494,15 @@ void FosterHistory::spin_up(const Environment& environment, const Loop& each) {
       openings_.fill(m, materials_[m], day_, spin_up_, reference_k_);
     });
   }
-  // Fill the table row by row.
-  each(materials_.size() * grid_nodes_, [this](std::size_t row) {
-    const std::size_t m = row / grid_nodes_;
-    const std::size_t j = row % grid_nodes_;
-    if (materials_[m].prescribed()) return;
-    const double scale = 2.0 / (grid_nodes_ - 1);
-    for (std::uint32_t i = 0; i < grid_nodes_; ++i) {
-      const FosterState<double> x =
-          spun_up(m, unit_from_octahedral(scale * i - 1.0, scale * static_cast<double>(j) - 1.0));
-      table_[row * grid_nodes_ + i] = texels_of(x);
-    }
-  });
+  table_.clear();
+  if (start_nodes_ == StartNodes::all) {
+    // Fill the table row by row.
+    each(materials_.size() * grid_nodes_, [this](std::size_t row) {
+      for (std::size_t column = 0; column < grid_nodes_; ++column) {
+        (void)node(row / grid_nodes_, row % grid_nodes_, column);
+      }
+    });
+  }
   revision_ = environment.revision();
   const auto changes_ns = environment.changes_ns();
   weather_before_start_ = !changes_ns.empty() && changes_ns.front() < history_start_ns_;

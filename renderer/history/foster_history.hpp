@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdint>
 #include <glm/ext/vector_double3.hpp>
-#include <glm/ext/vector_float4.hpp>
 #include <span>
 #include <vector>
 
@@ -16,6 +15,7 @@
 #include "history/ground_state.hpp"
 #include "history/open_grounds.hpp"
 #include "history/opening_states.hpp"
+#include "history/start_table.hpp"
 #include "history/step_plan.hpp"
 
 /// CPU part of the extended thermal model (`thermal.model = "foster"`): the temperature of the
@@ -39,8 +39,6 @@ namespace emit::renderer {
                                                             double reference_k,
                                                             double offset_k) noexcept;
 
-/// A number for each mode as shaders read it: in texels of four floats, with zeros at the end.
-using StateTexels = std::array<glm::vec4, (physics::kMaxFosterModes + 3) / 4>;
 /// Returns numbers of the modes as texels. RT-safe.
 [[nodiscard]] StateTexels texels_of(const physics::FosterState<double>& x) noexcept;
 
@@ -62,7 +60,7 @@ enum class DryGrounds : std::uint8_t {
 /// begin the history. Owner: Renderer.
 /// Thread: the renderer's.  Real time: update is RT-safe and takes some microseconds per interval
 /// and per ground that holds water. When the host changed the weather before the history's start,
-/// the spin-up runs again (tens of milliseconds per material).
+/// the spin-up runs again (tens of milliseconds per material, if all nodes of the table are found).
 class FosterHistory {
  public:
   /// Number and total length of the intervals at the end of the spin-up that are computed per
@@ -78,7 +76,8 @@ class FosterHistory {
   /// offsets from reference_k. It allocates.
   FosterHistory(const scene::ScenarioDesc& scenario, std::vector<FosterMaterial> materials,
                 FosterMaterial surroundings, const Environment& environment, double reference_k,
-                DryGrounds dry_grounds = DryGrounds::followed);
+                DryGrounds dry_grounds = DryGrounds::followed,
+                StartNodes start_nodes = StartNodes::all);
 
   /// Computes the forcing of the plan's intervals. Returns true when the table has changed.
   /// extend() may follow only if dry grounds are followed.
@@ -99,8 +98,8 @@ class FosterHistory {
 
   /// Returns the table of states by material, row and column of the grid. Node (i, j) of a grid of
   /// m nodes per axis is the direction of octahedral coordinates (2 i / (m - 1) - 1, 2 j / (m - 1)
-  /// - 1).
-  [[nodiscard]] std::span<const StateTexels> table() const noexcept { return table_; }
+  /// - 1). Nodes are zero that nobody has asked for, unless all are found.
+  [[nodiscard]] std::span<const StateTexels> table() const noexcept { return table_.texels(); }
   [[nodiscard]] std::uint32_t grid_nodes() const noexcept { return grid_nodes_; }
 
   /// Returns states from the table by bilinear interpolation. Thread: any. RT-safe.
@@ -137,7 +136,7 @@ class FosterHistory {
                                                      const glm::dvec3& normal) const noexcept;
 
  private:
-  /// Fills the table of spun-up states. `each(rows, fill)` calls fill(row) for every row, in any
+  /// Makes the table of spun-up states. `each(rows, fill)` calls fill(row) for every row, in any
   /// order.
   template <class Loop>
   void spin_up(const Environment& environment, const Loop& each);
@@ -149,6 +148,9 @@ class FosterHistory {
   /// Returns the states of an unshadowed face at the start of the spin-up, or of the history.
   [[nodiscard]] physics::FosterState<double> first_states(std::size_t material,
                                                           const glm::dvec3& normal) const noexcept;
+  /// Returns the states of a node of the table.
+  [[nodiscard]] StateTexels node(std::size_t material, std::size_t row,
+                                 std::size_t column) const noexcept;
   /// Advances the surroundings over one interval and writes its forcing.
   void carry(const HistoryInterval& interval, double tolerance_k, IntervalForcing& out) noexcept;
   [[nodiscard]] SurfaceForcing forcing(const physics::SunPosition& sun,
@@ -167,6 +169,7 @@ class FosterHistory {
   GroundState ground_at_start_;  ///< state at the history's start
   OpenGrounds grounds_;
   DryGrounds dry_grounds_;
+  StartNodes start_nodes_;
   bool follow_ = true;  ///< carry() advances the grounds
   double surroundings_now_k_ = 0.0;
 
@@ -179,7 +182,7 @@ class FosterHistory {
   std::vector<IntervalForcing> tail_;
   std::vector<IntervalForcing> intervals_;
   std::vector<std::int64_t> nodes_ns_;
-  std::vector<StateTexels> table_;
+  StartTable table_;
 
   std::uint64_t revision_ = 0;
   bool weather_before_start_ = false;

@@ -90,12 +90,12 @@ std::string shared_water_warning(const scene::ScenarioDesc& scenario,
 std::optional<FosterHistory> make_foster(const scene::ScenarioDesc& scenario,
                                          std::vector<FosterMaterial> materials,
                                          const Environment& environment, double reference_k,
-                                         DryGrounds dry_grounds) {
+                                         DryGrounds dry_grounds, StartNodes start_nodes) {
   if (materials.empty()) return std::nullopt;
   const FosterMaterial surroundings = materials.back();
   materials.pop_back();
   return FosterHistory(scenario, std::move(materials), surroundings, environment, reference_k,
-                       dry_grounds);
+                       dry_grounds, start_nodes);
 }
 
 }  // namespace emit::renderer

@@ -42,6 +42,6 @@ inline constexpr double kTwinSd = 1.5;
 [[nodiscard]] std::optional<FosterHistory> make_foster(
     const scene::ScenarioDesc& scenario, std::vector<FosterMaterial> materials,
     const Environment& environment, double reference_k,
-    DryGrounds dry_grounds = DryGrounds::followed);
+    DryGrounds dry_grounds = DryGrounds::followed, StartNodes start_nodes = StartNodes::all);
 
 }  // namespace emit::renderer

@@ -30,7 +30,7 @@ physics::Result<std::vector<IntervalForcing>> surface_forcing(
     built->pop_back();
     // No host can send rain here.
     FosterHistory history(start, std::move(*built), surroundings, environment, physics::kReferenceK,
-                          DryGrounds::skipped);
+                          DryGrounds::skipped, StartNodes::asked);
     history.forcing_over(nodes_ns, environment, out);
     return out;
   }

@@ -456,8 +456,15 @@ physics::Pose GlRenderer::scenario_sensor_pose_at(std::int64_t sim_time_ns) cons
 Result<void> GlRenderer::warm_up(const FrameRequest& first, const WarmUpProgress& progress) {
   if (auto ready = warm_up_stage(first, progress); !ready) return ready;
   if (output_.ladder != Ladder::live || !passes_.enlarge) {
-    // Render one frame, because drivers compile when something is drawn for the first time.
-    if (const int slot = submit(first); slot >= 0) {
+    // Render one frame, because drivers compile when something is drawn for the first time. A few
+    // pixels suffice where each of them integrates its own history.
+    constexpr std::uint32_t kFewPx = 32;
+    FrameRequest drawn = first;
+    if (scenario_.thermal.method == scene::ThermalMethod::per_frame) {
+      const glm::uvec2 size_px = glm::min(output_px(), glm::uvec2(kFewPx));
+      drawn.window_px = {0, 0, size_px.x, size_px.y};
+    }
+    if (const int slot = submit(drawn); slot >= 0) {
       (void)collect(static_cast<SlotIndex>(slot));
       release(static_cast<SlotIndex>(slot));
     }

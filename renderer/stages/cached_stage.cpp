@@ -180,7 +180,7 @@ CachedStage::CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb&
       plan_(scenario.thermal),
       surface_history_(scenario.thermal.steps,
                        make_foster(scenario, std::move(foster_materials), history.environment,
-                                   physics::kReferenceK)),
+                                   physics::kReferenceK, DryGrounds::followed, StartNodes::asked)),
       surface_(std::move(surface)),
       saved_(std::move(saved)),
       shade_pass_(std::move(shade_pass)) {}

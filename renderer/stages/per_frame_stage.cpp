@@ -86,7 +86,7 @@ PerFrameStage::PerFrameStage(const scene::ScenarioDesc& scenario, scene::SceneGe
       materials_(geometry.materials),
       plan_(scenario.thermal),
       foster_(make_foster(scenario, std::move(foster_materials), history.environment,
-                          physics::kReferenceK, DryGrounds::skipped)),
+                          physics::kReferenceK, DryGrounds::skipped, StartNodes::all)),
       tail_steps_(foster_ ? static_cast<std::uint32_t>(foster_->tail().size()) : 0),
       drawn_(std::move(geometry), histories_of_objects(scenario),
              (scenario.thermal.steps + 1) * scenario.thermal.max_cascades),

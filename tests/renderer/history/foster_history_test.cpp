@@ -270,6 +270,40 @@ TEST(FosterHistory, WeatherBeforeTheStartRunsTheSpinUpAgain) {
   EXPECT_EQ(history.table()[7], before);
 }
 
+TEST(FosterHistory, NodesThatAreFoundWhenAskedForAreThoseOfTheWholeTable) {
+  const scene::ScenarioDesc s = scenario(0.0);
+  Environment environment(s);
+  const auto materials = foster_materials(s.materials, s.thermal);
+  ASSERT_TRUE(materials.has_value());
+  const FosterHistory all = history_of(s, environment);
+  FosterHistory asked(s, *materials, materials->front(), environment, kReferenceK,
+                      DryGrounds::followed, StartNodes::asked);
+  const auto expect_same = [&](const FosterHistory& expected) {
+    for (std::size_t m = 0; m < materials->size(); ++m) {
+      for (const glm::dvec3& normal : {glm::dvec3(0.0, 0.0, 1.0), glm::dvec3(0.0, 0.0, -1.0),
+                                       glm::dvec3(0.6, 0.0, 0.8), glm::dvec3(-0.48, 0.64, -0.6)}) {
+        // The second answer is that of a node that is known.
+        for (int i = 0; i < 2; ++i) {
+          EXPECT_EQ(asked.start_states(m, normal), expected.start_states(m, normal)) << m;
+        }
+      }
+    }
+  };
+  expect_same(all);
+  // New weather before the start makes other nodes.
+  scene::WeatherSample sample;
+  sample.sim_time_ns = -100'000 * kSecondNs;
+  sample.air_k = 290.0;
+  sample.longwave_down_w_m2 = 320.0;
+  ASSERT_TRUE(environment.append(sample));
+  StepPlan plan(s.thermal);
+  plan.update(3600 * kSecondNs, environment, {});
+  EXPECT_TRUE(asked.update(plan, environment));
+  const FosterHistory changed = history_of(s, environment);
+  EXPECT_NE(changed.start_states(0, {0.0, 0.0, 1.0}), all.start_states(0, {0.0, 0.0, 1.0}));
+  expect_same(changed);
+}
+
 TEST(FosterHistory, RainWetsWhatHoldsWaterAndNothingElse) {
   scene::ScenarioDesc s = scenario(0.0);
   s.materials[0].water_store_mm = 0.48;
