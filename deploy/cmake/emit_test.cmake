@@ -27,16 +27,15 @@ if(EMIT_PRECOMPILED_HEADERS)
     <gmock/gmock.h> <gtest/gtest.h>)
 endif()
 
-# emit_test(NAME name LABEL label SOURCES ... [SEPARATE ...] LIBS ... [SERIAL [BESIDE filter]] [TIMEOUT seconds]
-#   [COST seconds])
+# emit_test(NAME name LABEL label SOURCES ... [SEPARATE ...] LIBS ... [SERIAL [BESIDE filter]] [TIMEOUT seconds])
 # One GoogleTest executable; each TEST becomes a CTest case carrying the label.
 # SERIAL runs its tests while no others run, except those that BESIDE names (a filter of GoogleTest): they take no fixed
 # port and wait for no deadline.
-# COST is about what the longest of its tests takes. CTest starts costly tests first, and knows no times in a new tree.
+# Long tests are named in tests/costs/costs.cmake.
 # With EMIT_UNITY_BUILD a few sources at a time are compiled as one, as in emit_library. SEPARATE names those of SOURCES
 # that define the same private names as others.
 function(emit_test)
-  cmake_parse_arguments(arg "SERIAL" "NAME;LABEL;TIMEOUT;COST;BESIDE" "SOURCES;SEPARATE;LIBS" ${ARGN})
+  cmake_parse_arguments(arg "SERIAL" "NAME;LABEL;TIMEOUT;BESIDE" "SOURCES;SEPARATE;LIBS" ${ARGN})
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 300)
   endif()
@@ -49,9 +48,6 @@ function(emit_test)
     UNITY_BUILD ${EMIT_UNITY_BUILD} UNITY_BUILD_BATCH_SIZE 12)
   set_source_files_properties(${arg_SEPARATE} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
   set(properties LABELS ${arg_LABEL} TIMEOUT ${arg_TIMEOUT})
-  if(arg_COST)
-    list(APPEND properties COST ${arg_COST})
-  endif()
   set(filter)
   if(arg_BESIDE)
     gtest_discover_tests(${arg_NAME} TEST_PREFIX "${arg_LABEL}." TEST_FILTER "${arg_BESIDE}" PROPERTIES ${properties}
