@@ -40,6 +40,8 @@ trajectory = [
 ]
 [thermal]
 max_samples = 4000
+history_start_s = -600
+spin_up_s = 3600
 method = ")" +
          method + "\"\n";
 }

@@ -76,7 +76,7 @@ double seen_k(const scene::ScenarioDesc& s, const glm::dvec3& from_m, const glm:
   Session run(s);
   const physics::Pose eye = looking(from_m, at_m);
   std::vector<float> frame;
-  for (std::int64_t now_ns = from_ns; now_ns < kShownNs; now_ns += 5 * kSecondNs) {
+  for (std::int64_t now_ns = from_ns; now_ns < kShownNs; now_ns += 15 * kSecondNs) {
     frame = run.frame_k(now_ns, eye);
   }
   double sum_k = 0.0;

@@ -31,7 +31,7 @@ std::string work_folder(const std::filesystem::path& out) {
 
 /// The image is small, which keeps llvmpipe quick.
 const std::vector<std::string> kSmall{
-    "--set", "sensor.width_px=320", "--set", "sensor.height_px=256", "--set", "thermal.steps=9"};
+    "--set", "sensor.width_px=160", "--set", "sensor.height_px=128", "--set", "thermal.steps=9"};
 
 std::vector<std::string> with_small(std::vector<std::string> arguments) {
   for (const std::string& argument : kSmall) arguments.push_back(argument);

@@ -102,8 +102,11 @@ TEST(CliEngage, SaysWhatIsWrongWithASeeker) {
       {"echo cannot see >&2; false", "cannot see"},
       {R"(echo '{"ready": true}'; cat /dev/null; true)", "seeker: the program has ended"}};
   for (const auto& [seeker, text] : cases) {
+    // The daemon is warm before it has a seeker, and one warm-up serves all.
     const ProcessResult result =
-        run_emit(coarse({"engage", "--seeker", seeker, "--out", folder.file("out")}), kEngageLimit);
+        run_emit(coarse({"engage", "--seeker", seeker, "--out", folder.file("out"), "--set",
+                         "thermal.state_file=" + folder.file("surface.state")}),
+                 kEngageLimit);
     EXPECT_EQ(result.exit_code, 1) << result.out;
     EXPECT_THAT(result.err, HasSubstr(text));
   }

@@ -64,7 +64,12 @@ TEST(CliExplain, the_terms_add_up_to_the_pixel_through_air_of_every_kind_and_ove
                : std::vector<std::string>{"10,50"};
     for (const std::string& px : pixels) {
       SCOPED_TRACE(std::to_string(a) + " at " + px);
-      Arguments more{"--hours", "0", "--json", folder.file("e.json")};
+      // A coarse history is quick, and the terms are those of any temperature.
+      Arguments more{"--hours", "0",
+                     "--json",  folder.file("e.json"),
+                     "--set",   "thermal.tolerance_k=20",
+                     "--set",   "thermal.spin_up_s=3600",
+                     "--set",   "thermal.first_step_s=120"};
       more.insert(more.end(), airs[a].begin(), airs[a].end());
       const ProcessResult result = explain(px, more);
       ASSERT_EQ(result.exit_code, 0) << result.err;
@@ -125,7 +130,9 @@ TEST(CliExplain, only_a_pixel_with_a_small_target_is_told_to_be_drawn_otherwise)
                         "--set",
                         "sensor.height_px=64",
                         "--set",
-                        "thermal.tolerance_k=8"};
+                        "thermal.tolerance_k=8",
+                        "--set",
+                        "thermal.state_file=" + folder.file("surface.state")};
   Arguments render{"render", "--channel", "coverage", "--out", folder.file("f.exr")};
   render.insert(render.end(), scene.begin(), scene.end());
   ASSERT_EQ(run_emit(render).exit_code, 0);
