@@ -40,6 +40,7 @@ trajectory = [
 ]
 [thermal]
 max_samples = 4000
+shadow_map_px = 256
 history_start_s = -600
 spin_up_s = 3600
 method = ")" +
