@@ -180,7 +180,7 @@ AirFilm air_film(const AirFlow& flow, const AirFilmBody& body) noexcept {
   film.unstable_quarter = 0.54 * quarter;
   film.unstable_third = 0.14 * k * std::cbrt(buoyancy);
   film.stable_quarter = 0.27 * quarter;
-  // Set those of leaves, physics.md eq. 90: one side has the unstable film, the other the stable
+  // Set those of leaves, physics.md eq. 97: one side has the unstable film, the other the stable
   // one.
   film.leaf_quarter = 0.5 * (0.54 + 0.27) * k * std::pow(buoyancy, 0.25);
   film.leaf_forced = kOutdoors * 0.664 * k * std::sqrt(kLeafWind * speed_m_s / kinematic_m2_s) *

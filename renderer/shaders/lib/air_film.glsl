@@ -2,7 +2,7 @@
 #ifndef EMIT_LIB_AIR_FILM
 #define EMIT_LIB_AIR_FILM
 
-// Film coefficient of a face in the wind (physics.md eq. 31 to 34 and 90). Twin of emit/physics/air_film.hpp.
+// Film coefficient of a face in the wind (physics.md eq. 31 to 34 and 97). Twin of emit/physics/air_film.hpp.
 
 // Film coefficient in W/m2/K of a face of unit normal `n` (world axes, z up), which is `excess_k` warmer than the air.
 // `skin` is the roughness factor of its material, and what leaves add to the forced and to the natural part.

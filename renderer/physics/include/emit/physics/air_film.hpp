@@ -8,7 +8,7 @@
 
 #include "emit/physics/weather.hpp"
 
-/// Exchange of heat between surfaces and the air (physics.md section 8, eq. 31 to 36 and 90). Raw
+/// Exchange of heat between surfaces and the air (physics.md section 8, eq. 31 to 36 and 97). Raw
 /// SI numbers. Any thread. RT-safe. shaders/lib/air_film.glsl is the float32 twin of film_w_m2_k().
 namespace emit::physics {
 
@@ -93,7 +93,7 @@ struct FilmSkin {
   constexpr FilmSkin(double roughness_factor = 1.0) noexcept : roughness(roughness_factor) {}
 
   double roughness = 1.0;
-  /// Leaves (physics.md eq. 90): area of their sides by that of the face, by length^-1/2 and
+  /// Leaves (physics.md eq. 97): area of their sides by that of the face, by length^-1/2 and
   /// length^-1/4. Zero for a face without leaves.
   double leaf_forced = 0.0;
   double leaf_natural = 0.0;
@@ -131,7 +131,7 @@ struct AirFlow {
 /// Returns the film coefficient of a level, medium rough face 10 K above the air, for estimates.
 [[nodiscard]] double typical_film_w_m2_k(const Forcing& weather) noexcept;
 
-/// Returns the natural part of the film of a face, W m-2 K-1 (physics.md eq. 31, 32 and 90).
+/// Returns the natural part of the film of a face, W m-2 K-1 (physics.md eq. 31, 32 and 97).
 /// `normal_up` is the vertical component of the unit normal, `excess_k` the temperature of the face
 /// above the air.
 [[nodiscard]] inline double natural_film_w_m2_k(const AirFilm& film, const FilmSkin& skin,
@@ -153,7 +153,7 @@ struct AirFlow {
 }
 
 /// Returns the forced part on a smooth face of that unit normal, or on its leaves, W m-2 K-1
-/// (physics.md eq. 33 and 90).
+/// (physics.md eq. 33 and 97).
 [[nodiscard]] inline double forced_film_w_m2_k(const AirFilm& film, const FilmSkin& skin,
                                                const glm::dvec3& normal) noexcept {
   if (skin.leafy()) return skin.leaf_forced * film.leaf_forced;
