@@ -430,6 +430,10 @@ Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
   scenario.channels = resolve_channels(root, known, diagnostics);
   scenario.bands = bands_in_use(scenario.channels, declared);
   scenario.atmosphere = resolve_atmosphere(root, scenario, diagnostics);
+  // Weather that was measured has the fog in it; the models of the clear sky get its shade.
+  if (scenario.atmosphere.fog && scenario.weather.empty()) {
+    scenario.clear_sky.fog = physics::fog_shade(*scenario.atmosphere.fog);
+  }
 
   const std::vector<Node>& material_nodes = pool.members[0].value.items;
   scenario.materials = resolve_materials(material_nodes, known, diagnostics);

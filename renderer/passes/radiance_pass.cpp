@@ -34,6 +34,7 @@ physics::Result<RadiancePass> RadiancePass::create(const scene::ThermalOptions& 
   if (content.clutter) defines.push_back({"EMIT_CLUTTER", "1"});
   if (content.clutter_emissivity) defines.push_back({"EMIT_CLUTTER_EMISSIVITY", "1"});
   if (content.clouds) defines.push_back({"EMIT_CLOUDS", "1"});
+  if (content.fog) defines.push_back({"EMIT_FOG", "1"});
   if (options.model == scene::ThermalModel::foster) {
     defines.push_back({"EMIT_FOSTER_GROUPS", fmt::format("{}", content.foster_groups)});
   }

@@ -23,6 +23,7 @@ struct RadianceContent {
   bool clutter = false;             ///< some materials vary from place to place
   bool clutter_emissivity = false;  ///< the emissivity of some does
   bool clouds = false;              ///< there are broken clouds
+  bool fog = false;                 ///< there is a layer of fog
   std::uint32_t foster_groups = 1;  ///< texels with the modes of a pixel: foster_groups()
 };
 

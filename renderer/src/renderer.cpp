@@ -273,7 +273,8 @@ RadianceContent radiance_content(const BandModel& bands, const ClutterFields& cl
                      (output.terms ? EMIT_OUTPUT_TERMS : 0U),
           .clutter = !clutter.empty(),
           .clutter_emissivity = clutter.change_emissivity(),
-          .clouds = clouds};
+          .clouds = clouds,
+          .fog = bands.fog()};
 }
 
 /// True when some object of the scenario is an entity.
@@ -549,6 +550,8 @@ void GlRenderer::prepare(const FrameRequest& request, const QualityLevel& level)
                          request.sensor_pose.position_world_m, request.thermal_time_ns);
   }
   bands_.update(stage_->forcing_now(), sun, moon, sensor_m, cloud_light);
+  frame_params_.fog_above_m = bands_.fog_above_m();
+  frame_params_.fog_k = static_cast<float>(stage_->forcing_now().air_k);
   if (passes_.targets) passes_.targets->prepare(targets, camera.view, frame_params_);
   if (gas_) prepare_gas(request);
   upload_frame();

@@ -189,6 +189,11 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
     entry.sun_outside_w_m2 = sun_outside_w_m2(entry.band);
     entry.sky_frac = sky_frac(entry.vertical_transmittance_frac);
     entry.has_sky = atmosphere != nullptr;
+    if (scenario.atmosphere.fog) {
+      entry.fog = physics::fog_optics(*scenario.atmosphere.fog, spectral);
+      params.fog_per_m = static_cast<float>(entry.fog.extinction_per_m);
+      params.fog_wide_per_m = static_cast<float>(entry.fog.wide_extinction_per_m());
+    }
     model.nodes_per_band_ = static_cast<std::uint32_t>(lut->nodes().size());
     model.tables_.insert(model.tables_.end(), lut->nodes().begin(), lut->nodes().end());
     model.params_.push_back(params);
@@ -198,6 +203,9 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
   model.turbidity_ = scenario.clear_sky.linke_turbidity;
   model.cloud_base_ = scenario.clear_sky.cloud_base;
   model.clouds_ = scenario.clouds;
+  model.fog_ = scenario.atmosphere.fog;
+  if (model.fog_) model.fog_shade_ = physics::fog_shade(*model.fog_);
+  model.fog_lights_.resize(model.fog_ ? model.entries_.size() : 0);
   model.cloud_views_.resize(model.entries_.size());
   // The sky keeps to one dew point over the whole run: the humidity of a weather table does not
   // count.
@@ -265,9 +273,16 @@ std::vector<physics::ApparentTemperature> BandModel::apparent_temperatures() con
 BandModel::Instant BandModel::instant_of(const physics::Forcing& forcing,
                                          const physics::SunPosition& sun) const noexcept {
   Instant now;
-  now.sky = clouds_ ? physics::sky_of_cover(forcing.longwave_down_w_m2, forcing.air_k, dew_point_k_,
+  double longwave_w_m2 = forcing.longwave_down_w_m2;
+  if (fog_shade_) {
+    longwave_w_m2 = physics::longwave_above_fog_w_m2(
+        *fog_shade_, longwave_w_m2, forcing.air_k,
+        physics::sky_longwave_w_m2(physics::Kelvin(forcing.air_k), physics::Kelvin(dew_point_k_),
+                                   0.0));
+  }
+  now.sky = clouds_ ? physics::sky_of_cover(longwave_w_m2, forcing.air_k, dew_point_k_,
                                             clouds_->cover_frac, cloud_base_)
-                    : physics::sky_state(forcing.longwave_down_w_m2, forcing.air_k, dew_point_k_,
+                    : physics::sky_state(longwave_w_m2, forcing.air_k, dew_point_k_,
                                          forcing.cloud_frac, cloud_base_);
   now.air_k = forcing.air_k;
   now.cloud_frac = forcing.cloud_frac;
@@ -279,6 +294,11 @@ BandModel::Instant BandModel::instant_of(const physics::Forcing& forcing,
                     physics::beam_share_frac(forcing.direct_normal_w_m2, sun,
                                              physics::Metres(place_m_), turbidity_);
   }
+  now.beam_above_fog_frac = now.beam_frac;
+  if (fog_shade_ && sun.direction_enu.z > 0.0) {
+    now.beam_above_fog_frac = physics::beam_above_fog_frac(
+        *fog_shade_, now.beam_frac, sun.direction_enu.z, 1.0 - forcing.cloud_frac);
+  }
   now.sin_sun = std::sin(sun.elevation.value());
   now.sin_shown = std::sin(physics::apparent_elevation(sun.elevation).value());
   now.distance_au = sun.distance_au;
@@ -286,9 +306,10 @@ BandModel::Instant BandModel::instant_of(const physics::Forcing& forcing,
 }
 
 double BandModel::shown_beam_frac(const Instant& now, double sensor_m) const noexcept {
-  if (sensor_m < place_m_ + now.sky.cloud_base_m) return now.beam_frac;
-  if (clouds_) return now.beam_frac * cloud_light_.gain;
-  return now.cloud_frac < 1.0 && now.beam_frac > 0.0 ? now.beam_frac / (1.0 - now.cloud_frac) : 1.0;
+  const double beam_frac = now.beam_above_fog_frac;
+  if (sensor_m < place_m_ + now.sky.cloud_base_m) return beam_frac;
+  if (clouds_) return beam_frac * cloud_light_.gain;
+  return now.cloud_frac < 1.0 && beam_frac > 0.0 ? beam_frac / (1.0 - now.cloud_frac) : 1.0;
 }
 
 void BandModel::update_scattered(const Entry& entry, const Instant& now, double sensor_m,
@@ -339,6 +360,8 @@ void BandModel::update(const physics::Forcing& forcing, const physics::SunPositi
                        const physics::CloudLight& cloud_light) noexcept {
   const Instant now = instant_of(forcing, sun);
   cloud_light_ = cloud_light;
+  if (fog_) fog_above_m_ = static_cast<float>(place_m_ + fog_->top_m - sensor_m);
+  fog_k_ = static_cast<float>(now.air_k);
   sunlit_ = false;
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     const Entry& entry = entries_[i];
@@ -356,6 +379,13 @@ void BandModel::update(const physics::Forcing& forcing, const physics::SunPositi
     };
     params.air_radiance_w_m2_sr = static_cast<float>(black(now.air_k));
     params.sky_air_radiance_w_m2_sr = static_cast<float>(black(now.air_k + now.sky.warmer_k));
+    if (fog_) {
+      const auto& fog = fog_lights_[i] = fog_light_of(i, now, sky_above_fog(i, now));
+      params.fog_light_w_m2_sr = glm::vec4(
+          glm::dvec4(fog.black_w_m2_sr, fog.sky_w_m2_sr, fog.ground_w_m2_sr, fog.sun_w_m2_sr));
+      params.fog_rates =
+          glm::vec4(glm::dvec4(fog.rate_per_m, fog.sun_rate_per_m, fog.depth_m, 0.0));
+    }
     update_clouds(i, now, sensor_m);
     update_bodies(entry, now, moon, sensor_m, params);
     if (lobes_) update_lobe_sky(i, now);
@@ -379,8 +409,8 @@ double air_transmittance(std::span<const physics::AirView::Node> nodes,
   return std::exp(-std::exp(physics::air_log_extinction(node, temperature_k)) * sight.range_m);
 }
 
-BandModel::AirWay BandModel::air_way(std::size_t band, const Sight& sight,
-                                     float temperature_k) const noexcept {
+BandModel::AirWay BandModel::clear_way(std::size_t band, const Sight& sight,
+                                       float temperature_k) const noexcept {
   const Entry& entry = entries_[band];
   const gpu::BandParams& params = params_[band];
   AirWay out;
@@ -467,6 +497,14 @@ RadianceTerms BandModel::terms(std::size_t band, const Seen& seen,
         weights += seen.bodies.moon_weight[p];
       }
       out.bodies_w_m2_sr += clear_frac * seen.bodies.moon_frac * moon_through_frac * sum / weights;
+    }
+    if (fog_) {
+      const Sight sight{static_cast<float>(physics::kFogFarM), seen.sin_elevation,
+                        seen.sensor_height_m, seen.ray_sun_cosine};
+      (void)put_fog_before(band, sight, fog_lights_[band].wide_per_m, out.path_w_m2_sr,
+                           out.scattered_w_m2_sr);
+      const auto fog = physics::fog_stretch(fog_above_m_, sight.sin_elevation, sight.range_m);
+      out.bodies_w_m2_sr *= std::exp(-fog_lights_[band].extinction_per_m * double{fog.length_m});
     }
     return out;
   }

@@ -11,6 +11,7 @@
 #include "emit/physics/band_radiance_lut.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/physics/planck.hpp"
+#include "emit/physics/sky/fog.hpp"
 #include "emit/physics/sky/moon.hpp"
 #include "emit/physics/sky_state.hpp"
 #include "emit/physics/weather.hpp"
@@ -49,12 +50,13 @@ class BandModel final : public BandLights {
     return tables_[first_emissivity_ + material * entries_.size() + band];
   }
 
-  /// Air between the camera and a point, by band.
+  /// Air between the camera and a point with its fog, by band.
   struct AirWay {
     double air_frac = 1.0;           ///< transmittance for what a source at the temperature emits
     double air_sun_frac = 1.0;       ///< transmittance for reflected sunlight
     double path_w_m2_sr = 0.0;       ///< thermal
     double scattered_w_m2_sr = 0.0;  ///< sunlight
+    double fog_frac = 1.0;           ///< transmittance of the fog, which the others include
   };
   /// Line of sight to a point.
   struct Sight {
@@ -117,6 +119,10 @@ class BandModel final : public BandLights {
   [[nodiscard]] std::span<const physics::AirView::Node> air_nodes_now() const noexcept {
     return std::span(air_nodes_).first(sunlit_ ? air_nodes_.size() : first_sun_node_);
   }
+  /// True if there is a layer of fog.
+  [[nodiscard]] bool fog() const noexcept { return fog_.has_value(); }
+  /// Height of the fog's top above the camera of update(), m.
+  [[nodiscard]] float fog_above_m() const noexcept { return fog_above_m_; }
   /// Bits of the bands whose air is a table.
   [[nodiscard]] std::uint32_t air_table() const noexcept { return air_table_; }
   /// Largest number of exponential terms of a band.
@@ -147,6 +153,7 @@ class BandModel final : public BandLights {
     double climate_k = 0.0;       ///< air temperature of the climate at the ground of the place
     double sun_outside_w_m2 = 0;  ///< in band, normal to the sun, at 1 au
     bool has_sky = false;         ///< false: a band without air shows no sky
+    physics::FogOptics fog = {};
   };
   /// Table of the sunlight that the air of a band scatters; empty where there is none.
   [[nodiscard]] std::span<const physics::AirView::Node> sun_nodes_of(
@@ -163,7 +170,8 @@ class BandModel final : public BandLights {
     double environment_k = 0.0;
     double air_mass = 0.0;
     double cloud_frac = 0.0;
-    double beam_frac = 0.0;  ///< direct sun over that of a clear sky
+    double beam_frac = 0.0;            ///< direct sun on the ground over that of a clear sky
+    double beam_above_fog_frac = 0.0;  ///< the same above the fog, if there is any
     double sin_sun = 0.0;
     double sin_shown = 0.0;  ///< of the apparent elevation
     double distance_au = 1.0;
@@ -173,6 +181,30 @@ class BandModel final : public BandLights {
   /// Air of the place against that of the climate at sea level; 0 without built-in air.
   [[nodiscard]] double warmer_k(const Entry& entry, const Instant& now) const noexcept;
   [[nodiscard]] double sky_warmer_k(const Entry& entry, const Instant& now) const noexcept;
+  /// Air on a line of sight as if there were no fog.
+  [[nodiscard]] AirWay clear_way(std::size_t band, const Sight& sight,
+                                 float temperature_k) const noexcept;
+  /// Puts the fog before the radiance of what lies on a line of sight, for one of the extinctions
+  /// of FogLight: weakens both radiances, adds its own to the first, and returns its transmittance.
+  [[nodiscard]] double put_fog_before(std::size_t band, const Sight& sight, double extinction_per_m,
+                                      double& path_w_m2_sr,
+                                      double& scattered_w_m2_sr) const noexcept;
+  /// Clear sky of a band in a direction from the ground of the place, above the fog.
+  [[nodiscard]] double clear_sky_w_m2_sr(const Entry& entry, const Instant& now,
+                                         double sin_elevation) const noexcept;
+  /// Sky of a band with its clouds above the fog, by elevation from the ground of the place.
+  [[nodiscard]] physics::AirView::ByElevation sky_above_fog(std::size_t band,
+                                                            const Instant& now) const noexcept;
+  /// Light of the fog in a band below such a sky. @pre there is fog
+  [[nodiscard]] physics::FogLight<double> fog_light_of(
+      std::size_t band, const Instant& now,
+      const physics::AirView::ByElevation& above) const noexcept;
+  /// Sky in a direction from the ground, with the fog before it.
+  [[nodiscard]] double through_fog_w_m2_sr(const physics::FogLight<double>& light,
+                                           double above_w_m2_sr,
+                                           double sin_elevation) const noexcept;
+  /// Transmittance of the air for the direct sun.
+  [[nodiscard]] double sun_through_frac(const Entry& entry, const Instant& now) const noexcept;
   /// Direct sun over that of a clear sky, as a camera at a height sees it.
   [[nodiscard]] double shown_beam_frac(const Instant& now, double sensor_m) const noexcept;
   /// Sets the sunlight that the air of a band scatters towards the camera.
@@ -211,6 +243,11 @@ class BandModel final : public BandLights {
   double dew_point_k_ = 0.0;
   physics::CloudBase cloud_base_;
   std::optional<physics::Clouds> clouds_;
+  std::optional<physics::Fog> fog_;
+  std::optional<physics::FogShade> fog_shade_;
+  std::vector<physics::FogLight<double>> fog_lights_;  ///< of the latest update(), by band
+  float fog_above_m_ = 0.0F;
+  float fog_k_ = 0.0F;
   physics::CloudLight cloud_light_;                         ///< of the latest update()
   std::vector<physics::AirView::ByElevation> cloud_views_;  ///< by band, as params() has them
   std::uint32_t air_model_ = 0;

@@ -67,18 +67,36 @@ void BandModel::update_clouds(std::size_t band, const Instant& now, double senso
   }
 }
 
+double BandModel::sun_through_frac(const Entry& entry, const Instant& now) const noexcept {
+  if (entry.view) return entry.view->sun_transmittance_frac(place_m_, now.sin_shown);
+  if (entry.air) return entry.air->out(now.sin_sun).transmittance_frac;
+  return std::pow(entry.vertical_transmittance_frac, now.air_mass);
+}
+
 void BandModel::light_of(std::size_t band, const Instant& now, BandLight& out) const noexcept {
   const Entry& entry = entries_[band];
   const auto black = [&](double kelvin) {
     return physics::band_radiance(entry.band, physics::Kelvin(kelvin)).radiance_w_m2_sr;
   };
   out.surroundings_w_m2_sr = static_cast<float>(black(now.environment_k));
-  // Take the clear sky and the sun's transmittance from the kind of air that the band has.
-  double sun_transmittance_frac = std::pow(entry.vertical_transmittance_frac, now.air_mass);
+  out.sun_w_m2 = static_cast<float>(entry.sun_outside_w_m2 / (now.distance_au * now.distance_au) *
+                                    now.beam_frac * sun_through_frac(entry, now));
+  if (fog_) {
+    physics::AirView::ByElevation sky = sky_above_fog(band, now);
+    const auto fog = fog_light_of(band, now, sky);
+    for (std::size_t e = 0; e < sky.size(); ++e) {
+      sky[e] = static_cast<float>(
+          through_fog_w_m2_sr(fog, double{sky[e]}, physics::AirView::node_sine(e)));
+    }
+    const physics::SkyByTilt below_w_m2_sr = physics::sky_by_tilt_of(sky);
+    std::ranges::transform(below_w_m2_sr, out.sky_w_m2_sr.begin(),
+                           [](double radiance) { return static_cast<float>(radiance); });
+    return;
+  }
+  // Take the clear sky from the kind of air that the band has.
   physics::SkyByTilt clear_w_m2_sr{};
   if (entry.view) {
     clear_w_m2_sr = entry.view->clear_sky_by_tilt_w_m2_sr(place_m_, sky_warmer_k(entry, now));
-    sun_transmittance_frac = entry.view->sun_transmittance_frac(place_m_, now.sin_shown);
     if (entry.view->scatters() && now.beam_frac > 0.0) {
       const double share = now.beam_frac / (now.distance_au * now.distance_au);
       const auto scattered = entry.view->scattered_sky_by_tilt_w_m2_sr(place_m_, now.sin_shown);
@@ -86,7 +104,6 @@ void BandModel::light_of(std::size_t band, const Instant& now, BandLight& out) c
     }
   } else if (entry.air) {
     clear_w_m2_sr = entry.air_sky_w_m2_sr;
-    sun_transmittance_frac = entry.air->out(now.sin_sun).transmittance_frac;
   } else {
     const double sky_air_w_m2_sr = black(now.air_k + now.sky.warmer_k);
     for (std::size_t t = 0; t < physics::kSkyTilts; ++t) {
@@ -103,8 +120,6 @@ void BandModel::light_of(std::size_t band, const Instant& now, BandLight& out) c
     out.sky_w_m2_sr[t] =
         static_cast<float>((1.0 - cover_frac) * clear_w_m2_sr[t] + cover_frac * clouds_w_m2_sr[t]);
   }
-  out.sun_w_m2 = static_cast<float>(entry.sun_outside_w_m2 / (now.distance_au * now.distance_au) *
-                                    now.beam_frac * sun_transmittance_frac);
 }
 
 void BandModel::light_at(const physics::Forcing& forcing, const physics::SunPosition& sun,
@@ -115,33 +130,19 @@ void BandModel::light_at(const physics::Forcing& forcing, const physics::SunPosi
 
 void BandModel::update_lobe_sky(std::size_t band, const Instant& now) noexcept {
   const Entry& entry = entries_[band];
-  const auto black = [&](double kelvin) {
-    return physics::band_radiance(entry.band, physics::Kelvin(kelvin)).radiance_w_m2_sr;
-  };
   const double cover_frac = entry.has_sky ? now.sky.cloud_cover_frac : 0.0;
   const auto clouds_w_m2_sr =
       cover_frac > 0.0 ? clouds_by_elevation(band, now, place_m_) : physics::AirView::ByElevation{};
-  const double air_w_m2_sr = black(now.air_k + now.sky.warmer_k);
-  const double warmer_k = entry.view ? sky_warmer_k(entry, now) : 0.0;
+  physics::FogLight<double> fog;
+  if (fog_) fog = fog_light_of(band, now, sky_above_fog(band, now));
   std::array<double, LobeModel::kSkySamples> sky_w_m2_sr{};
   for (std::size_t s = 0; s < sky_w_m2_sr.size(); ++s) {
     const double sine = LobeModel::sky_sample_sine(s);
-    double clear_w_m2_sr = 0.0;
-    if (entry.view) {
-      clear_w_m2_sr = entry.view->clear_sky_w_m2_sr(place_m_, warmer_k, sine);
-      if (entry.view->scatters() && now.beam_frac > 0.0) {
-        clear_w_m2_sr += now.beam_frac / (now.distance_au * now.distance_au) *
-                         entry.view->scattered_sky_w_m2_sr(place_m_, now.sin_shown, sine);
-      }
-    } else if (entry.air) {
-      clear_w_m2_sr = entry.air->out(sine).path_radiance_w_m2_sr;
-    } else if (entry.has_sky) {
-      const double mass = physics::relative_air_mass(physics::Radians(std::asin(sine)));
-      clear_w_m2_sr = air_w_m2_sr * (1.0 - std::pow(entry.vertical_transmittance_frac, mass));
-    }
+    const double clear_w_m2_sr = clear_sky_w_m2_sr(entry, now, sine);
     const auto cloud_w_m2_sr =
         static_cast<double>(physics::sky_at_elevation(clouds_w_m2_sr, static_cast<float>(sine)));
-    sky_w_m2_sr[s] = (1.0 - cover_frac) * clear_w_m2_sr + cover_frac * cloud_w_m2_sr;
+    const double above = (1.0 - cover_frac) * clear_w_m2_sr + cover_frac * cloud_w_m2_sr;
+    sky_w_m2_sr[s] = fog_ ? through_fog_w_m2_sr(fog, above, sine) : above;
   }
   lobes_->update_sky(band, sky_w_m2_sr, std::span(air_nodes_).first(LobeModel::kSkyTable));
 }

@@ -593,8 +593,9 @@ void GasModel::add(const Puff& puff, const View& view, const BandModel& bands,
     out.air_share_frac[k] = 1.0F;
     for (const GasAir& own : air) {
       if (own.band != b || !(way.air_frac > 0.0)) continue;
+      const double air_alone_frac = way.air_frac / way.fog_frac;
       out.air_share_frac[k] = static_cast<float>(
-          std::min(1.0, air_transmittance(own.nodes, sight, kelvin) / way.air_frac));
+          std::min(1.0, air_transmittance(own.nodes, sight, kelvin) / air_alone_frac));
     }
     out.source_w_m2_sr[k] = static_cast<float>(
         puff.flare

@@ -7,6 +7,7 @@
 #include "emit/physics/atmosphere_table.hpp"
 #include "emit/physics/constants.hpp"
 #include "emit/physics/planck.hpp"
+#include "emit/physics/sky/fog.hpp"
 
 namespace emit::config::testing {
 namespace {
@@ -228,6 +229,51 @@ TEST_F(ConfigTest, the_shipped_atmosphere_table_agrees_with_what_it_was_made_fro
       EXPECT_NEAR(apparent_k(1.0), 240.8, 6.0);
     }
   }
+}
+
+TEST_F(ConfigTest, fog_is_read_and_printed_and_shades_the_models_of_the_clear_sky) {
+  constexpr const char* kFog =
+      "[atmosphere.fog]\nkind = \"moderate_radiation\"\nvisibility_m = 400.0\ntop_m = 60.0\n";
+  const auto clear = scenario("");
+  ASSERT_TRUE(clear) << clear.error().text;
+  EXPECT_FALSE(clear->atmosphere.fog);
+  EXPECT_FALSE(clear->clear_sky.fog);
+  const auto loaded = scenario(kFog);
+  ASSERT_TRUE(loaded) << loaded.error().text;
+  EXPECT_EQ(loaded->atmosphere.fog,
+            (physics::Fog{physics::FogKind::moderate_radiation, 400.0, 60.0}));
+  ASSERT_TRUE(loaded->clear_sky.fog);
+  EXPECT_EQ(*loaded->clear_sky.fog, physics::fog_shade(*loaded->atmosphere.fog));
+  const std::string printed = print_scenario(*loaded);
+  const auto second = load_scenario(write("printed.toml", printed), {}, options_);
+  ASSERT_TRUE(second) << second.error().text;
+  EXPECT_EQ(second->atmosphere.fog, loaded->atmosphere.fog);
+  EXPECT_EQ(print_scenario(*second), printed);
+  // What a weather table measured has the fog in it.
+  const auto measured = scenario(
+      kFog + std::string("[[weather.sample]]\ntime_s = 0\ndni_w_m2 = 0\ndhi_w_m2 = 90\n"
+                         "longwave_down_w_m2 = 370\nair_k = 284\nwind_m_s = 1\n"));
+  ASSERT_TRUE(measured) << measured.error().text;
+  EXPECT_TRUE(measured->atmosphere.fog);
+  EXPECT_FALSE(measured->clear_sky.fog);
+}
+
+TEST_F(ConfigTest, faults_of_fog_name_file_and_key) {
+  const auto fault = [&](const std::string& text) {
+    const auto loaded = scenario(text);
+    return loaded ? std::string("none") : loaded.error().text;
+  };
+  using ::testing::HasSubstr;
+  const std::string kind = "[atmosphere.fog]\nkind = \"heavy_advection\"\n";
+  EXPECT_THAT(fault("[atmosphere.fog]\nkind = \"smog\"\nvisibility_m = 50\ntop_m = 9\n"),
+              ::testing::AllOf(HasSubstr(".toml:"), HasSubstr("'kind' is 'smog', must be one of: heavy_adv")));
+  EXPECT_THAT(fault(kind + "top_m = 9\n"), HasSubstr("visibility_m"));
+  EXPECT_THAT(fault(kind + "visibility_m = 50\n"), HasSubstr("top_m"));
+  EXPECT_THAT(fault(kind + "visibility_m = 5\ntop_m = 9\n"), HasSubstr("'visibility_m' is 5"));
+  EXPECT_THAT(fault(kind + "visibility_m = 50\ntop_m = 0\n"), HasSubstr("'top_m' is 0"));
+  EXPECT_THAT(fault(kind + "visibility_m = 50\ntop_m = 9\ndepth_m = 9\n"), HasSubstr("depth_m"));
+  EXPECT_THAT(fault("[atmosphere]\nenabled = false\n" + kind + "visibility_m = 50\ntop_m = 9\n"),
+              HasSubstr("'fog' needs air"));
 }
 
 }  // namespace

@@ -68,6 +68,7 @@ struct AtmosphereDraft {
   std::optional<double> water_ratio;
   std::filesystem::path file;
   std::vector<scene::BandAtmosphere> bands;
+  std::optional<physics::Fog> fog;
 };
 struct BandDraft {
   scene::SpectralBand desc;
@@ -103,6 +104,7 @@ struct DaemonHead {
 [[nodiscard]] const KeyTable<WeatherDraft>& weather_keys();
 [[nodiscard]] const KeyTable<scene::WeatherSample>& weather_sample_keys();
 [[nodiscard]] const KeyTable<AtmosphereDraft>& atmosphere_keys();
+[[nodiscard]] const KeyTable<physics::Fog>& fog_keys();
 [[nodiscard]] const KeyTable<scene::BandAtmosphere>& band_atmosphere_keys();
 [[nodiscard]] const KeyTable<scene::ThermalOptions>& thermal_keys();
 [[nodiscard]] const KeyTable<scene::DisplayOptions>& display_keys();

@@ -363,7 +363,36 @@ const KeyTable<AtmosphereDraft>& atmosphere_keys() {
                        diagnostics);
           },
           [](const AtmosphereDraft& in) { return write_array(in.bands, band_atmosphere_keys()); }),
+      custom<AtmosphereDraft>(
+          {"fog", "table", "", "", "Fog, mist or humid haze near the ground (`[atmosphere.fog]`).",
+           false},
+          [](AtmosphereDraft& out, const Node& node, Diagnostics& diagnostics) {
+            if (!expect_table(node, "fog", diagnostics)) return;
+            out.fog.emplace();
+            read_table(node, fog_keys(), *out.fog, diagnostics);
+          },
+          [](const AtmosphereDraft& in) -> std::optional<std::string> {
+            if (!in.fog) return std::nullopt;
+            return inline_table(*in.fog, fog_keys());
+          }),
   };
+  return keys;
+}
+
+const KeyTable<physics::Fog>& fog_keys() {
+  static const KeyTable<physics::Fog> keys = [] {
+    std::vector<std::pair<std::string, physics::FogKind>> kinds;
+    for (const auto& [name, kind] : physics::kFogKinds) kinds.emplace_back(name, kind);
+    return KeyTable<physics::Fog>{
+        required(choice<physics::Fog>("kind", kinds, EMIT_FIELD(kind),
+                                      "Droplets, from the largest to the smallest (see Fog).")),
+        required(
+            number<physics::Fog>("visibility_m", "m", between(20, 10000), EMIT_FIELD(visibility_m),
+                                 "Range at which 2 % of a contrast are left in visible light.")),
+        required(number<physics::Fog>("top_m", "m", between(1, 2000), EMIT_FIELD(top_m),
+                                      "Height of its top above the world's origin.")),
+    };
+  }();
   return keys;
 }
 

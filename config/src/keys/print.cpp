@@ -139,6 +139,7 @@ std::string print_scenario(const scene::ScenarioDesc& scenario) {
     atmosphere.visibility_km = band.model->visibility_km;
     atmosphere.water_ratio = band.model->water_ratio;
   }
+  atmosphere.fog = scenario.atmosphere.fog;
   print_section("[atmosphere]", atmosphere, atmosphere_keys(), out);
 
   print_section("[thermal]", scenario.thermal, thermal_keys(), out);

@@ -468,6 +468,10 @@ scene::AtmosphereDesc resolve_atmosphere(const Node& root, const scene::Scenario
   read_table(table, atmosphere_keys(), draft, diagnostics);
   scene::AtmosphereDesc out;
   out.enabled = draft.enabled;
+  out.fog = draft.fog;
+  if (draft.fog && !draft.enabled) {
+    diagnostics.add(key_location(table, "fog"), "'fog' needs air: atmosphere.enabled is false");
+  }
   std::vector<BandAtmosphere> from_file;
   if (!draft.file.empty()) {
     auto loaded = load_atmosphere(draft.file, bands, speakable_band_names(root, bands));

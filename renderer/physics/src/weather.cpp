@@ -7,6 +7,7 @@
 #include "emit/physics/air_film.hpp"
 #include "emit/physics/check.hpp"
 #include "emit/physics/climate/gusts.hpp"
+#include "emit/physics/constants.hpp"
 #include "emit/physics/evaporation.hpp"
 
 namespace emit::physics {
@@ -98,6 +99,26 @@ Forcing at_place(Forcing forcing, const GeoPlace& place, const SunPosition& sun)
   return forcing;
 }
 
+namespace {
+
+/// Returns the forcing on the ground below fog (physics.md eq. 94 to 96).
+Forcing under_fog(Forcing f, const FogShade& fog, const SunPosition& sun) noexcept {
+  const double sine = sun.direction_enu.z;
+  f.diffuse_horizontal_w_m2 *= fog_skylight_frac(fog);
+  if (sine > 0.0) {
+    const double beam_frac = fog_beam_frac(fog, sine);
+    f.diffuse_horizontal_w_m2 += std::max(0.0, fog_sunlight_frac(fog, sine) - beam_frac) * sine *
+                                 (1.0 - f.cloud_frac) * f.direct_normal_w_m2;
+    f.direct_normal_w_m2 *= beam_frac;
+  }
+  const double through = fog.longwave_through_frac;
+  f.longwave_down_w_m2 = through * f.longwave_down_w_m2 +
+                         (1.0 - through) * kStefanBoltzmannWPerM2K4 * std::pow(f.air_k, 4.0);
+  return f;
+}
+
+}  // namespace
+
 Forcing forcing_from_clear_sky(const ClearSky& model, const GeoPlace& place, const SunPosition& sun,
                                std::int64_t posix_utc_ns) noexcept {
   const SolarIrradiance solar = clear_sky_irradiance(sun, place.height, model.linke_turbidity);
@@ -113,6 +134,7 @@ Forcing forcing_from_clear_sky(const ClearSky& model, const GeoPlace& place, con
   f.wind_m_s = model.wind_m_s;
   set_wind_direction(model.wind_from_rad, f);
   f.cloud_frac = model.cloud_frac * (1.0 - model.cloud_transmission_frac);
+  if (model.fog) f = under_fog(f, *model.fog, sun);
   return with_vapour(at_place(f, place, sun), model.dew_point_k);
 }
 

@@ -416,16 +416,30 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
   const physics::SunPosition sun =
       physics::sun_position(scenario.epoch_utc_ns + view.sim_time_ns, place);
   const double cloud_frac = cloud_frac_at(scenario, view.sim_time_ns);
-  const double beam_frac = physics::beam_share_frac(now.direct_normal_w_m2, sun, place.height,
-                                                    scenario.clear_sky.linke_turbidity);
+  const double ground_beam_frac = physics::beam_share_frac(
+      now.direct_normal_w_m2, sun, place.height, scenario.clear_sky.linke_turbidity);
   const double dew_point_k = scenario.weather.empty()
                                  ? scenario.clear_sky.dew_point_k
                                  : physics::usual_dew_point_k(scene::mean_air_k(scenario));
+  // Find the sun and the sky above the fog.
+  double beam_frac = ground_beam_frac;
+  double longwave_w_m2 = now.longwave_down_w_m2;
+  if (scenario.atmosphere.fog) {
+    const physics::FogShade fog = physics::fog_shade(*scenario.atmosphere.fog);
+    if (sun.direction_enu.z > 0.0) {
+      beam_frac = physics::beam_above_fog_frac(fog, ground_beam_frac, sun.direction_enu.z,
+                                               1.0 - cloud_frac);
+    }
+    longwave_w_m2 = physics::longwave_above_fog_w_m2(
+        fog, longwave_w_m2, now.air_k,
+        physics::sky_longwave_w_m2(physics::Kelvin(now.air_k), physics::Kelvin(dew_point_k), 0.0));
+  }
+  const double fog_beam_frac = beam_frac > 0.0 ? ground_beam_frac / beam_frac : 1.0;
   const physics::SkyState sky_now =
       scenario.clouds
-          ? covered_sky_by_bisection(now.longwave_down_w_m2, now.air_k, dew_point_k,
+          ? covered_sky_by_bisection(longwave_w_m2, now.air_k, dew_point_k,
                                      scenario.clouds->cover_frac, scenario.clear_sky.cloud_base)
-          : sky_by_bisection(now.longwave_down_w_m2, now.air_k, dew_point_k, cloud_frac,
+          : sky_by_bisection(longwave_w_m2, now.air_k, dew_point_k, cloud_frac,
                              scenario.clear_sky.cloud_base);
   const CloudSun* const clouds = climate->clouds();
   const double sensor_m = view.sensor_pose.position_world_m.z;
@@ -444,7 +458,8 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
   }
   for (std::size_t b = 0; b < bands.size(); ++b) {
     BandRadiance& band = bands[b];
-    band.set_air(now.air_k, sun, beam_frac, beam_above_frac, sky_now);
+    band.set_air(now.air_k, sun, beam_frac, beam_above_frac, sky_now,
+                 {fog_beam_frac, now.surroundings_k});
     // Compute the radiance that every patch sends out.
     const double around = band.black(now.surroundings_k);
     const double level_sky = band.sky_mean(1.0);  // patches hold faces of several tilts
@@ -504,6 +519,7 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
             clouds->opacity_frac(view.sensor_pose.position_world_m, sky_rays[p], view.sim_time_ns);
         sky = std::lerp(sky, band.cloud(sensor_m, sky_rays[p].z), opacity);
       }
+      sky = band.through_fog(sky, sensor_m, sky_rays[p]);
       plane[p] = static_cast<float>(sky + discs.radiance_w_m2_sr(band, view, p));
     }
   }

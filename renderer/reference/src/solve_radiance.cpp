@@ -198,6 +198,10 @@ physics::Result<BandRadiance> BandRadiance::create(const scene::ScenarioDesc& sc
     }
   }
   out.place_m_ = scenario.place.height_m;
+  out.fog_ = scenario.atmosphere.fog;
+  if (out.fog_) {
+    out.fog_optics_ = physics::fog_optics(*out.fog_, scene::spectral_band(scenario.bands[band]));
+  }
   const auto air = physics::BandAir::build(scene::spectral_band(scenario.bands[band]));
   out.sun_outside_w_m2_ = air ? air->sun_outside_w_m2()
                               : out.black(physics::kSunTemperatureK) * physics::kPi *
@@ -206,7 +210,9 @@ physics::Result<BandRadiance> BandRadiance::create(const scene::ScenarioDesc& sc
 }
 
 void BandRadiance::set_air(double air_k, const physics::SunPosition& sun, double beam_frac,
-                           double beam_above_frac, const physics::SkyState& sky_now) {
+                           double beam_above_frac, const physics::SkyState& sky_now,
+                           const UnderFog& under_fog) {
+  air_k_ = air_k;
   air_ = black(air_k);
   parted_ = false;
   sky_now_ = sky_now;
@@ -233,13 +239,15 @@ void BandRadiance::set_air(double air_k, const physics::SunPosition& sun, double
     through = table_ ? table_->out(sin_sun).transmittance_frac
                      : std::pow(vertical_frac_, air_mass(sin_sun));
   }
-  // Average the sky before faces of every tilt over elevation and azimuth, by the midpoint rule.
+  // Find the sky by elevation, and with its mean the light of the fog.
   const int rings = column_ ? 400 : 1000;
   constexpr int kSectors = 90;  // of half a turn
-  std::array<double, kTiltSteps + 1> weights{};
-  sky_means_.fill(0.0);
+  const auto elevation_of = [rings](int i) { return (i + 0.5) / rings * physics::kPi / 2.0; };
+  std::vector<double> ring_w_m2_sr;
+  double level_w_m2_sr = 0.0;
+  double level_weights = 0.0;
   for (int i = 0; i < rings; ++i) {
-    const double elevation = (i + 0.5) / rings * physics::kPi / 2.0;
+    const double elevation = elevation_of(i);
     // Take the phase functions' mean all around.
     physics::SunScatter::Kinds phase{};
     for (int k = 0; k < kSectors && shine_; ++k) {
@@ -250,7 +258,27 @@ void BandRadiance::set_air(double air_k, const physics::SunPosition& sun, double
       const auto one = scatter_->phase_per_sr(cosine);
       for (std::size_t j = 0; j < phase.size(); ++j) phase[j] += one[j] / kSectors;
     }
-    const double radiance = sky(0.0, std::sin(elevation), phase);
+    ring_w_m2_sr.push_back(sky(0.0, std::sin(elevation), phase));
+    const double weight = std::sin(elevation) * std::cos(elevation);
+    level_w_m2_sr += weight * ring_w_m2_sr.back();
+    level_weights += weight;
+  }
+  if (fog_) {
+    fog_light_ = physics::fog_light(
+        fog_optics_, fog_->top_m,
+        {.black_w_m2_sr = air_,
+         .sky_w_m2_sr = level_w_m2_sr / level_weights,
+         .ground_w_m2_sr = black(under_fog.ground_k),
+         .sun_w_m2 = sun_outside_w_m2_ / (sun.distance_au * sun.distance_au) * beam_frac * through,
+         .sin_sun = std::sin(physics::apparent_elevation(sun.elevation).value())});
+  }
+  // Average the sky before faces of every tilt over elevation and azimuth, by the midpoint rule.
+  std::array<double, kTiltSteps + 1> weights{};
+  sky_means_.fill(0.0);
+  for (int i = 0; i < rings; ++i) {
+    const double elevation = elevation_of(i);
+    const double radiance = through_fog(ring_w_m2_sr[static_cast<std::size_t>(i)], 0.0,
+                                        {std::cos(elevation), 0.0, std::sin(elevation)});
     for (std::size_t t = 0; t <= kTiltSteps; ++t) {
       const double tilt = std::min(static_cast<double>(t) / kTiltSteps, 0.999) * physics::kPi;
       double cosines = 0.0;
@@ -265,7 +293,8 @@ void BandRadiance::set_air(double air_k, const physics::SunPosition& sun, double
     }
   }
   for (std::size_t t = 0; t <= kTiltSteps; ++t) sky_means_[t] /= weights[t];
-  sun_w_m2_ = sun_outside_w_m2_ / (sun.distance_au * sun.distance_au) * beam_frac * through;
+  sun_w_m2_ = sun_outside_w_m2_ / (sun.distance_au * sun.distance_au) * beam_frac *
+              under_fog.beam_frac * through;
 }
 
 double BandRadiance::sky_mean(double normal_up) const noexcept {
@@ -291,7 +320,44 @@ physics::SunScatter::Kinds BandRadiance::scattered(const physics::AirPath& path,
   return light;
 }
 
+physics::FogStretch<double> BandRadiance::in_fog(double sensor_m, double sin_elevation,
+                                                 double range_m) const noexcept {
+  if (!fog_) return {0.0, 0.0};
+  return physics::fog_stretch(fog_->top_m - sensor_m, sin_elevation, range_m);
+}
+
+double BandRadiance::through_fog(double clear_w_m2_sr, double sensor_m,
+                                 const physics::FogStretch<double>& stretch,
+                                 double extinction_per_m, const glm::dvec3& direction) const {
+  const double through = std::exp(-extinction_per_m * stretch.length_m);
+  const double glow =
+      physics::fog_glow_w_m2_sr(fog_light_, extinction_per_m, std::max(fog_->top_m - sensor_m, 0.0),
+                                direction.z, stretch.length_m);
+  if (!(stretch.begin_m > 0.0)) return through * clear_w_m2_sr + glow;
+  // See the fog through the air before it.
+  const double path = through_air({0.0, 0.0, air_k_}, sensor_m, stretch.begin_m, direction);
+  const double seen = through_air({glow, 0.0, air_k_}, sensor_m, stretch.begin_m, direction);
+  return through * clear_w_m2_sr + seen - through * path;
+}
+
 double BandRadiance::at_aperture(const Leaving& leaving, double sensor_m, double range_m,
+                                 const glm::dvec3& direction) const {
+  const double clear_w_m2_sr = through_air(leaving, sensor_m, range_m, direction);
+  const auto stretch = in_fog(sensor_m, direction.z, range_m);
+  return stretch.length_m > 0.0 ? through_fog(clear_w_m2_sr, sensor_m, stretch,
+                                              fog_optics_.extinction_per_m, direction)
+                                : clear_w_m2_sr;
+}
+
+double BandRadiance::through_fog(double sky_w_m2_sr, double sensor_m,
+                                 const glm::dvec3& direction) const {
+  const auto stretch = in_fog(sensor_m, direction.z, physics::kFogFarM);
+  return stretch.length_m > 0.0 ? through_fog(sky_w_m2_sr, sensor_m, stretch,
+                                              fog_optics_.wide_extinction_per_m(), direction)
+                                : sky_w_m2_sr;
+}
+
+double BandRadiance::through_air(const Leaving& leaving, double sensor_m, double range_m,
                                  const glm::dvec3& direction) const {
   const double sin_elevation = direction.z;
   if (column_) {
@@ -379,13 +445,16 @@ double BandRadiance::cloud(double sensor_m, double sin_elevation) const {
 
 double BandRadiance::to_space(double sensor_m, double sin_elevation,
                               physics::AirSource source) const {
+  const double fog_frac = std::exp(-fog_optics_.extinction_per_m *
+                                   in_fog(sensor_m, sin_elevation, physics::kFogFarM).length_m);
   if (column_) {
     const double elevation_rad = std::asin(std::clamp(sin_elevation, -1.0, 1.0));
-    return air_terms_->transmittance(
-        physics::AirPath::to_space(*column_, place_m_ + sensor_m, elevation_rad), source);
+    return fog_frac *
+           air_terms_->transmittance(
+               physics::AirPath::to_space(*column_, place_m_ + sensor_m, elevation_rad), source);
   }
-  if (table_) return table_->out(sin_elevation).transmittance_frac;
-  return has_air_ ? std::pow(vertical_frac_, air_mass(sin_elevation)) : 1.0;
+  if (table_) return fog_frac * table_->out(sin_elevation).transmittance_frac;
+  return fog_frac * (has_air_ ? std::pow(vertical_frac_, air_mass(sin_elevation)) : 1.0);
 }
 
 double BandRadiance::sun_disc(double beam_frac, double sensor_m, double sin_elevation) const {

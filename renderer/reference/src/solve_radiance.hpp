@@ -9,6 +9,7 @@
 #include "emit/physics/air_model.hpp"
 #include "emit/physics/atmosphere_table.hpp"
 #include "emit/physics/error.hpp"
+#include "emit/physics/sky/fog.hpp"
 #include "emit/physics/sky/sun_scatter.hpp"
 #include "emit/physics/sky_state.hpp"
 #include "emit/physics/sun.hpp"
@@ -46,6 +47,12 @@ class BandIntegral {
                                                          double dew_point_k, double cover_frac,
                                                          const physics::CloudBase& base);
 
+/// What fog leaves and finds at the ground.
+struct UnderFog {
+  double beam_frac = 1.0;  ///< share of the direct sun above it that is left
+  double ground_k = 0.0;   ///< temperature of the ground that lights it
+};
+
 /// Radiance that leaves a surface and radiance that arrives at the camera, in one band. The stages
 /// are those of the renderer, with the scenario's atmosphere.
 class BandRadiance {
@@ -55,9 +62,10 @@ class BandRadiance {
                                                             std::size_t band);
 
   /// Sets the air temperature, the sun, the shares of a clear sky's direct sun that shine below and
-  /// above the clouds, and the sky.
+  /// above the clouds, and the sky, all of them above the fog.
   void set_air(double air_k, const physics::SunPosition& sun, double beam_frac,
-               double beam_above_frac, const physics::SkyState& sky_now);
+               double beam_above_frac, const physics::SkyState& sky_now,
+               const UnderFog& under_fog = {});
   /// Returns the in-band radiance of a blackbody, W m-2 sr-1.
   [[nodiscard]] double black(double kelvin) const { return integral_.radiance_w_m2_sr(kelvin); }
   /// Returns the emissivity of a material in this band.
@@ -85,8 +93,11 @@ class BandRadiance {
   [[nodiscard]] double at_aperture(const Leaving& leaving, double sensor_m, double range_m,
                                    const glm::dvec3& direction) const;
   /// Returns the radiance of the sky in a direction, W m-2 sr-1, from a height above the world's
-  /// origin.
+  /// origin, without the fog before it.
   [[nodiscard]] double sky(double sensor_m, const glm::dvec3& direction) const;
+  /// Returns the radiance of sky and clouds in a direction with the fog before them.
+  [[nodiscard]] double through_fog(double sky_w_m2_sr, double sensor_m,
+                                   const glm::dvec3& direction) const;
   /// Takes the clouds of sky() apart, for the picture: what sky_mean() says stays. sky() is then
   /// that between the clouds.
   void part_clouds() noexcept { parted_ = true; }
@@ -118,6 +129,20 @@ class BandRadiance {
   /// The sky for a phase function of the scattered light.
   [[nodiscard]] double sky(double sensor_m, double sin_elevation,
                            const physics::SunScatter::Kinds& phase_per_sr) const;
+  /// Radiance at the aperture as if there were no fog.
+  [[nodiscard]] double through_air(const Leaving& leaving, double sensor_m, double range_m,
+                                   const glm::dvec3& direction) const;
+  /// Part of a line of sight in the fog; none without fog.
+  [[nodiscard]] physics::FogStretch<double> in_fog(double sensor_m, double sin_elevation,
+                                                   double range_m) const noexcept;
+  /// Radiance at the aperture with the fog before it, for one of its extinctions.
+  [[nodiscard]] double through_fog(double clear_w_m2_sr, double sensor_m,
+                                   const physics::FogStretch<double>& stretch,
+                                   double extinction_per_m, const glm::dvec3& direction) const;
+  std::optional<physics::Fog> fog_;
+  physics::FogOptics fog_optics_;
+  physics::FogLight<double> fog_light_;
+  double air_k_ = 0.0;
   double place_m_ = 0.0;       ///< height of the world's origin above sea level
   double warmer_k_ = 0.0;      ///< air at sea level against that of the climate
   double sky_warmer_k_ = 0.0;  ///< the same in the sky

@@ -10,6 +10,7 @@
 //   EMIT_OUTPUTS    planes besides radiance, EMIT_OUTPUT_*
 //   EMIT_CLUTTER    defined: some materials vary from place to place; EMIT_CLUTTER_EMISSIVITY: their emissivity too
 //   EMIT_CLOUDS     defined: broken clouds shade the sun and stand in the sky
+//   EMIT_FOG        defined: a layer of fog lies over the ground
 //   EMIT_LOBES      index of the first number of the lobes, if there are glossy materials
 //   EMIT_ROWS       number of blocks of 8 x 8 pixels, one below the other, that a work group computes
 #include "passes/gbuffer.glsl"
@@ -40,6 +41,9 @@ layout(binding = EMIT_TEX_AIR) uniform samplerBuffer air_nodes;
 
 #ifdef EMIT_CLOUDS
 #include "passes/clouds.glsl"
+#endif
+#ifdef EMIT_FOG
+#include "lib/fog.glsl"
 #endif
 
 // Surface that a pixel shows. For a pixel of the sky only `boresight_m` is used.
@@ -259,6 +263,32 @@ float moon_disc_w_m2_sr(uint band, vec4 sight, vec2 centre, float cover_frac) {
   return cover_frac * through * bands[band].moon_through_frac * sum / weights;
 }
 
+#ifdef EMIT_FOG
+// Air before fog that begins at a place on the line of sight: x = transmittance for what the fog sends, y = its own
+// radiance. `sun_cosine` is that of the angle between the line of sight and the sun.
+vec2 air_before_fog(uint band, float begin_m, float sin_elevation, float sun_cosine) {
+  if (begin_m <= 0.0) return vec2(1.0, 0.0);
+  if ((EMIT_AIR_MODEL >> band & 1u) != 0u) {
+    AirPlace place = air_view_sight_place(frame.sensor_height_m + begin_m * sin_elevation, begin_m);
+    vec4 sight = air_view_node(int(bands[band].air_view_first), place);
+#ifdef EMIT_AIR_SUN
+    if ((EMIT_AIR_SUN >> band & 1u) != 0u && bands[band].air_sun_first != 0u) {
+      sight.w += air_sun_w_m2_sr(int(bands[band].air_sun_first), place, sun_cosine);
+    }
+#endif
+    return vec2(air_view_transmittance(log_extinction_at(sight, frame.fog_k), begin_m),
+                air_view_path_w_m2_sr(sight, begin_m));
+  }
+  if ((EMIT_AIR_TABLE >> band & 1u) != 0u) {
+    bool off_table = false;  // what lies behind the fog counts the pixel
+    return atmosphere_table_air(air_table(band), begin_m, sin_elevation, off_table);
+  }
+  if ((EMIT_AIR_TERMS >> band & 1u) == 0u) return vec2(1.0, 0.0);
+  float tau = transmittance(band, begin_m);
+  return vec2(tau, (1.0 - tau) * bands[band].air_radiance_w_m2_sr);
+}
+#endif
+
 // Radiance of clouds in a band at a place of the sky, with the air before them.
 float cloud_w_m2_sr(uint band, AirPlace sky) {
   int node = sky.low - kAirHeights * kAirRanges;
@@ -297,7 +327,7 @@ void write_pixel(ivec2 px) {
   AirPlace air_place = sky_place;
   AirPlace sight_place = air_view_sight_place(frame.sensor_height_m + range_m * sin_elevation, range_m);
   if (surface) air_place = sight_place;
-#ifdef EMIT_AIR_SUN
+#if defined(EMIT_AIR_SUN) || defined(EMIT_FOG)
   float ray_sun_cosine = dot(frame.to_sun, mat3(frame.relworld_from_sensor) * ray) / ray_length;
 #endif
   bool clamped = false;
@@ -319,6 +349,9 @@ void write_pixel(ivec2 px) {
 #ifdef EMIT_CLOUDS
   if (clouds.above_m > 0.0) sun_frac *= clouds.gain * (1.0 - clouds.depth * cloud);
   moon_frac *= 1.0 - cloud;
+#endif
+#ifdef EMIT_FOG
+  vec2 fog = fog_stretch(frame.fog_above_m, sin_elevation, surface ? range_m : kFogFarM);
 #endif
 
   // Compute the radiance of each band. Where both sides are cheap the code selects and does not branch, because
@@ -362,8 +395,22 @@ void write_pixel(ivec2 px) {
       radiance_w_m2_sr = mix(radiance_w_m2_sr, cloud_w_m2_sr(i, sky_place), bands[i].cloud_cover_frac);
     }
 #endif
-    if (sun_frac > 0.0) radiance_w_m2_sr += sun_disc_w_m2_sr(i, sight, sun_frac);
-    if (moon_frac > 0.0) radiance_w_m2_sr += moon_disc_w_m2_sr(i, sight, moon_centre, moon_frac);
+    float discs_w_m2_sr = 0.0;
+    if (sun_frac > 0.0) discs_w_m2_sr += sun_disc_w_m2_sr(i, sight, sun_frac);
+    if (moon_frac > 0.0) discs_w_m2_sr += moon_disc_w_m2_sr(i, sight, moon_centre, moon_frac);
+#ifdef EMIT_FOG
+    // Put fog before everything (physics.md eq. 91).
+    if (fog.y > 0.0) {
+      float per_m = surface ? bands[i].fog_per_m : bands[i].fog_wide_per_m;
+      float through = exp(-per_m * fog.y);
+      float glow = fog_glow_w_m2_sr(bands[i].fog_light_w_m2_sr, bands[i].fog_rates.xyz, per_m,
+                                    max(frame.fog_above_m, 0.0), sin_elevation, fog.y);
+      vec2 air = air_before_fog(i, fog.x, sin_elevation, ray_sun_cosine);
+      radiance_w_m2_sr = through * radiance_w_m2_sr + (1.0 - through) * air.y + air.x * glow;
+      discs_w_m2_sr *= exp(-bands[i].fog_per_m * fog.y);
+    }
+#endif
+    radiance_w_m2_sr += discs_w_m2_sr;
     bool finite = !(isnan(radiance_w_m2_sr) || isinf(radiance_w_m2_sr));
     nonfinite = nonfinite || !finite;
     planes[i * plane_px + pixel] = finite ? radiance_w_m2_sr : 0.0;

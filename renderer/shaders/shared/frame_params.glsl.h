@@ -40,7 +40,11 @@ struct FrameParams {
   float moon_sun_au;          // distance of the moon from the sun
   float node_bow;             // cached: share that the frame takes of the samples' bow between the nodes
   vec3 moon_to_sun;           // unit vector: right and down in the image, then towards the camera
+  float fog_above_m;          // fog: height of its top above the camera
+  float fog_k;                // fog: its temperature
   float unused1;
+  float unused2;
+  float unused3;
 };
 
 // Uniform block of one draw: one submesh of one instance.
@@ -183,12 +187,14 @@ struct BandParams {
   uint air_view_first;                  // index of the first node of the built-in air (lib/air_view.glsl)
   float sky_air_radiance_w_m2_sr;       // blackbody as warm as the air of the sky
   float cloud_cover_frac;               // share of the sky that even clouds cover
-  float unused0;
+  float fog_per_m;                      // fog: extinction of what surfaces, sun and moon send
   uint air_sun_first;                   // index of the first node of the air's scattered sunlight; 0: there is none
   float sun_disc_w_m2_sr;               // radiance of the sun: outside the air if that is built in, else as seen
   float moon_through_frac;              // share of the moon's light that clouds leave, and other air than the built-in one
   float moon_reflected_w_m2_sr;         // sunlight that the moon sends from where the sun stands in the zenith
-  float unused1;
+  float fog_wide_per_m;                 // fog: extinction of what the sky sends
+  vec4 fog_light_w_m2_sr;               // fog: physics::FogLight, its blackbody, sky, ground and sun
+  vec4 fog_rates;                       // fog: its two rates by height in m-1, the layer's depth over the ground, 0
   vec4 sky_by_tilt_w_m2_sr[EMIT_SKY_TILT_VEC4];  // mean of the sky that a face sees, see lib/sky_tilt.glsl
   vec4 cloud_w_m2_sr[EMIT_SKY_ELEVATION_VEC4];   // clouds by elevation with the air before them, at its nodes of the sky
 };
@@ -213,7 +219,7 @@ struct FrameStatsGpu {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(FrameParams) == 240);
+static_assert(sizeof(FrameParams) == 256);
 EMIT_SHARED_OFFSET(FrameParams, ray_per_px, 64);
 EMIT_SHARED_OFFSET(FrameParams, rendered_px, 80);
 EMIT_SHARED_OFFSET(FrameParams, output_px, 96);
@@ -225,6 +231,7 @@ EMIT_SHARED_OFFSET(FrameParams, to_sun, 176);
 EMIT_SHARED_OFFSET(FrameParams, sun_up, 188);
 EMIT_SHARED_OFFSET(FrameParams, moon_at_px, 208);
 EMIT_SHARED_OFFSET(FrameParams, moon_to_sun, 224);
+EMIT_SHARED_OFFSET(FrameParams, fog_k, 240);
 static_assert(sizeof(DrawParams) == 192);
 EMIT_SHARED_OFFSET(DrawParams, material, 112);
 EMIT_SHARED_OFFSET(DrawParams, tile_row, 128);
@@ -256,13 +263,14 @@ EMIT_SHARED_OFFSET(StepParams, moist_end, 80 * EMIT_MAX_CASCADES + 208);
 EMIT_SHARED_OFFSET(StepParams, air_start_offset_k, 80 * EMIT_MAX_CASCADES + 224);
 EMIT_SHARED_OFFSET(StepParams, cascade_count, 80 * EMIT_MAX_CASCADES + 240);
 static_assert(sizeof(RelaxationParams) == 32);
-static_assert(sizeof(BandParams) == 112 + 16 * (EMIT_SKY_TILT_VEC4 + EMIT_SKY_ELEVATION_VEC4));
+static_assert(sizeof(BandParams) == 144 + 16 * (EMIT_SKY_TILT_VEC4 + EMIT_SKY_ELEVATION_VEC4));
 EMIT_SHARED_OFFSET(BandParams, air_radiance_w_m2_sr, 32);
 EMIT_SHARED_OFFSET(BandParams, sun_irradiance_w_m2, 48);
 EMIT_SHARED_OFFSET(BandParams, air_table_first, 64);
 EMIT_SHARED_OFFSET(BandParams, sky_air_radiance_w_m2_sr, 80);
 EMIT_SHARED_OFFSET(BandParams, sun_disc_w_m2_sr, 96);
-EMIT_SHARED_OFFSET(BandParams, sky_by_tilt_w_m2_sr, 112);
+EMIT_SHARED_OFFSET(BandParams, fog_light_w_m2_sr, 112);
+EMIT_SHARED_OFFSET(BandParams, sky_by_tilt_w_m2_sr, 144);
 static_assert(sizeof(CloudParams) == 64);
 EMIT_SHARED_OFFSET(CloudParams, camera_tile, 16);
 EMIT_SHARED_OFFSET(CloudParams, camera_m, 40);

@@ -134,6 +134,9 @@ std::uint64_t weather_hash(const scene::ScenarioDesc& scenario) {
   add_optional(hash, sky.wind_from_rad);
   add_optional(hash, sky.cloud_base.height_m);
   add_optional(hash, sky.cloud_base.kelvin);
+  if (sky.fog) {
+    add(hash, sky.fog->sun_depth, sky.fog->sun_asymmetry, sky.fog->longwave_through_frac);
+  }
   add(hash, sky.cloud_transmission_frac, scenario.clouds.has_value());
   if (scenario.clouds) {
     const physics::Clouds& clouds = *scenario.clouds;

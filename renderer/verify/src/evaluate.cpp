@@ -38,6 +38,10 @@ constexpr Model kModels[] = {
       "transmittance and thermal radiance of the air between sensor and target; with the sun, by "
       "its apparent elevation and its azimuth from the line of sight, also what it scatters"},
      run_air_path},
+    {{"fog-path", kFogPathInputs, kFogPathOutputs,
+      "fog in a band, where a line of sight lies in it, and its transmittance beside the air's",
+      false},
+     run_fog_path},
     {{"air-sky", kAirSkyInputs, kAirSkyOutputs,
       "transmittance of the air to space and radiance of the clear sky; with the sun likewise"},
      run_air_sky},

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "emit/physics/csv.hpp"
+#include "emit/physics/planck.hpp"
 #include "emit/verify/evaluate.hpp"
 
 /// Functions of the models, one each. A function reads its columns from `table` and returns the
@@ -29,6 +30,10 @@ inline constexpr std::string_view kSunPositionOutputs = "azimuth,elevation";
 inline constexpr std::string_view kAirPathInputs =
     "model,vis_km,band,source,h_sensor_m,h_target_m,range_m[,sun_elevation_deg,sun_azimuth_deg]";
 inline constexpr std::string_view kAirPathOutputs = "tau_band,path_radiance_w_m2_sr";
+inline constexpr std::string_view kFogPathInputs =
+    "kind,visibility_m,top_m,band,h_sensor_m,h_target_m,range_m";
+inline constexpr std::string_view kFogPathOutputs =
+    "extinction_per_km,albedo_frac,asymmetry,begin_m,length_m,tau_fog";
 inline constexpr std::string_view kAirSkyInputs =
     "model,vis_km,band,h_sensor_m,elevation_deg[,sun_elevation_deg,sun_azimuth_deg]";
 inline constexpr std::string_view kAirSkyOutputs = "tau_flat,tau_sun,sky_radiance_w_m2_sr";
@@ -53,6 +58,11 @@ inline constexpr std::string_view kConductionLateralOutputs = "dT";
 inline constexpr std::string_view kSurfaceHistoryInputs = "t_s,Tair,E0,E1,E2,E3";
 inline constexpr std::string_view kSurfaceHistoryOutputs = "Ts0,Ts1,Ts2,Ts3";
 
+/// Returns the flat band of a name, by its limits in um: "3-5". Errors: parse.
+[[nodiscard]] physics::Result<physics::Band> flat_band(std::string_view band);
+
+[[nodiscard]] physics::Result<std::string> run_fog_path(const EvaluateRequest& request,
+                                                        const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_equilibrium(const EvaluateRequest& request,
                                                            const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_band_radiance(const EvaluateRequest& request,

@@ -31,7 +31,7 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   const gl::Define content[] = {{"EMIT_BANDS", "4u"},     {"EMIT_AIR_TERMS", "5u"},
                                 {"EMIT_AIR_TABLE", "2u"}, {"EMIT_AIR_MODEL", "8u"},
                                 {"EMIT_TERMS", "4"},      {"EMIT_OUTPUTS", "0u"},
-                                {"EMIT_ROWS", "1u"}};
+                                {"EMIT_ROWS", "1u"},      {"EMIT_FOG", "1"}};
   auto radiance = gl::Program::compute("passes/radiance.comp", content);
   ASSERT_TRUE(radiance) << radiance.error().text;
 
@@ -87,6 +87,8 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   EXPECT_OFFSET(*radiance, "frame_uniform", gpu::FrameParams, band_lut_nodes);
   EXPECT_OFFSET(*radiance, "frame_uniform", gpu::FrameParams, first_emissivity);
   EXPECT_OFFSET(*radiance, "frame_uniform", gpu::FrameParams, to_sun);
+  EXPECT_OFFSET(*radiance, "frame_uniform", gpu::FrameParams, fog_above_m);
+  EXPECT_OFFSET(*radiance, "frame_uniform", gpu::FrameParams, fog_k);
   EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, cascades[0].light_row0);
   EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, cascades[0].drift_frac);
   EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, cascades[3].scale_per_m);

@@ -48,7 +48,26 @@ TEST_F(Evaluate, ListsItsModels) {
                          "equilibrium", "balance", "band-radiance", "relaxation", "sun-position",
                          "sun-disc", "wall-shadow", "sky-view", "conduction-slab",
                          "conduction-semi-infinite", "conduction-layered", "conduction-lateral",
-                         "surface-history", "air-path", "air-sky", "air-sun"));
+                         "surface-history", "air-path", "fog-path", "air-sky", "air-sun"));
+}
+
+TEST_F(Evaluate, FogGivesOneRowForEachRowAndNamesWhatItDoesNotKnow) {
+  const std::string path = "kind,visibility_m,top_m,band,h_sensor_m,h_target_m,range_m\n";
+  // A line of sight from 100 m to the ground lies in the fog from half-way on.
+  const auto rows =
+      evaluate(request("fog-path", path + "heavy_advection,200,50,8-12,100,0,200\n"
+                                          "heavy_advection,200,50,8-12,100,60,nan\n"));
+  ASSERT_TRUE(rows.has_value()) << rows.error().text;
+  EXPECT_THAT(*rows, HasSubstr(",100,100,0.1068"));
+  EXPECT_THAT(*rows, testing::EndsWith(",nan,nan,nan\n"));
+  for (const auto& [row, fault] :
+       {std::pair{"smog,200,50,8-12,0,0,1\n", "in.csv:2: column 'kind': 'smog'"},
+        std::pair{"heavy_advection,0,50,8-12,0,0,1\n", "in.csv:2: column 'visibility_m'"},
+        std::pair{"heavy_advection,200,50,12-8,0,0,1\n", "in.csv:2: column 'band': '12-8'"}}) {
+    const auto bad = evaluate(request("fog-path", path + row));
+    ASSERT_FALSE(bad.has_value()) << row;
+    EXPECT_THAT(bad.error().text, HasSubstr(fault));
+  }
 }
 
 TEST_F(Evaluate, AirGivesOneRowForEachRowAndNamesWhatItDoesNotKnow) {

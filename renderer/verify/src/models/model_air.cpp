@@ -18,6 +18,21 @@
 #include "result_writer.hpp"
 
 namespace emit::verify {
+
+physics::Result<physics::Band> flat_band(std::string_view band) {
+  double lo_um = 0.0;
+  double hi_um = 0.0;
+  const char* end = band.data() + band.size();
+  const auto low = std::from_chars(band.data(), end, lo_um);
+  const bool dash = low.ec == std::errc{} && low.ptr != end && *low.ptr == '-';
+  const auto high = dash ? std::from_chars(low.ptr + 1, end, hi_um) : low;
+  if (!dash || high.ec != std::errc{} || high.ptr != end) {
+    return physics::make_error(physics::ErrorCode::parse,
+                               "a band is two wavelengths in um, as 3-5");
+  }
+  return physics::Band{lo_um, hi_um, {}};
+}
+
 namespace {
 
 using physics::AirColumn;
@@ -30,21 +45,7 @@ using physics::ErrorCode;
 using physics::Result;
 using physics::SunScatter;
 
-/// Flat band, by its limits in um: "3-5".
-Result<physics::Band> flat_band(std::string_view band) {
-  double lo_um = 0.0;
-  double hi_um = 0.0;
-  const char* end = band.data() + band.size();
-  const auto low = std::from_chars(band.data(), end, lo_um);
-  const bool dash = low.ec == std::errc{} && low.ptr != end && *low.ptr == '-';
-  const auto high = dash ? std::from_chars(low.ptr + 1, end, hi_um) : low;
-  if (!dash || high.ec != std::errc{} || high.ptr != end) {
-    return physics::make_error(ErrorCode::parse, "a band is two wavelengths in um, as 3-5");
-  }
-  return physics::Band{lo_um, hi_um, {}};
-}
-
-/// Air of such a band.
+/// Air of a flat band.
 Result<BandAir> air_of(std::string_view band) {
   const auto flat = flat_band(band);
   if (!flat) return tl::unexpected(flat.error());

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "emit/physics/clear_sky.hpp"
+#include "emit/physics/sky/fog.hpp"
 #include "emit/physics/sun.hpp"
 
 /// Weather that drives the surfaces at an instant. It comes from a weather table or from the
@@ -43,6 +44,8 @@ struct ClearSky {
   double cloud_transmission_frac = 0.0;
   std::optional<double> wind_from_rad;  ///< see WeatherSample
   CloudBase cloud_base = {};            ///< of any weather, not only of these models
+  /// Fog over the place. A weather table has the sun and the sky that were measured below it.
+  std::optional<FogShade> fog = std::nullopt;
 };
 
 /// Inputs of physics.md eq. 1 that do not depend on the surface.
@@ -91,8 +94,8 @@ struct Forcing {
 [[nodiscard]] Forcing at_place(Forcing forcing, const GeoPlace& place,
                                const SunPosition& sun) noexcept;
 
-/// Returns the forcing of a clear sky at a place and an instant (POSIX ns UTC). `sun` is the sun's
-/// position at that place and instant.
+/// Returns the forcing of a clear sky at a place and an instant (POSIX ns UTC), below the fog if
+/// there is any. `sun` is the sun's position at that place and instant.
 [[nodiscard]] Forcing forcing_from_clear_sky(const ClearSky& model, const GeoPlace& place,
                                              const SunPosition& sun,
                                              std::int64_t posix_utc_ns) noexcept;

@@ -15,6 +15,7 @@
 #include "emit/physics/evaporation.hpp"
 #include "emit/physics/frames.hpp"
 #include "emit/physics/sky/cloud_field.hpp"
+#include "emit/physics/sky/fog.hpp"
 #include "emit/physics/weather.hpp"
 #include "emit/scene/channel_output.hpp"
 #include "emit/scene/clutter_desc.hpp"
@@ -373,6 +374,7 @@ struct BandAtmosphere {
 struct AtmosphereDesc {
   bool enabled = true;
   std::vector<BandAtmosphere> bands;
+  std::optional<physics::Fog> fog = {};  ///< of the picture; what it does to heat: ClearSky::fog
 };
 
 enum class ThermalMethod : std::uint8_t { per_frame, cached };
