@@ -12,10 +12,9 @@ double BandModel::put_fog_before(std::size_t band, const Sight& sight, double ex
                                  double& path_w_m2_sr, double& scattered_w_m2_sr) const noexcept {
   const auto fog = physics::fog_stretch(fog_above_m_, sight.sin_elevation, sight.range_m);
   const double through = std::exp(-extinction_per_m * double{fog.length_m});
-  const double glow_w_m2_sr =
-      physics::fog_glow_w_m2_sr(fog_lights_[band], extinction_per_m,
-                                std::max(double{fog_above_m_}, 0.0), double{sight.sin_elevation},
-                                double{fog.length_m});
+  const double glow_w_m2_sr = physics::fog_glow_w_m2_sr(
+      fog_lights_[band], extinction_per_m, std::max(double{fog_above_m_}, 0.0),
+      double{sight.sin_elevation}, double{fog.length_m});
   AirWay before;
   if (fog.begin_m > 0.0F) {
     Sight to_fog = sight;
@@ -24,8 +23,7 @@ double BandModel::put_fog_before(std::size_t band, const Sight& sight, double ex
   }
   path_w_m2_sr = through * path_w_m2_sr + (1.0 - through) * before.path_w_m2_sr +
                  before.air_frac * glow_w_m2_sr;
-  scattered_w_m2_sr =
-      through * scattered_w_m2_sr + (1.0 - through) * before.scattered_w_m2_sr;
+  scattered_w_m2_sr = through * scattered_w_m2_sr + (1.0 - through) * before.scattered_w_m2_sr;
   return through;
 }
 
@@ -80,14 +78,14 @@ physics::FogLight<double> BandModel::fog_light_of(
   const auto black = [&](double kelvin) {
     return physics::band_radiance(entry.band, physics::Kelvin(kelvin)).radiance_w_m2_sr;
   };
-  return physics::fog_light(entry.fog, fog_->top_m,
-                            {.black_w_m2_sr = black(now.air_k),
-                             .sky_w_m2_sr = physics::sky_by_tilt_of(above).front(),
-                             .ground_w_m2_sr = black(now.environment_k),
-                             .sun_w_m2 = now.beam_above_fog_frac * entry.sun_outside_w_m2 /
-                                         (now.distance_au * now.distance_au) *
-                                         sun_through_frac(entry, now),
-                             .sin_sun = now.sin_shown});
+  return physics::fog_light(
+      entry.fog, fog_->top_m,
+      {.black_w_m2_sr = black(now.air_k),
+       .sky_w_m2_sr = physics::sky_by_tilt_of(above).front(),
+       .ground_w_m2_sr = black(now.environment_k),
+       .sun_w_m2 = now.beam_above_fog_frac * entry.sun_outside_w_m2 /
+                   (now.distance_au * now.distance_au) * sun_through_frac(entry, now),
+       .sin_sun = now.sin_shown});
 }
 
 double BandModel::through_fog_w_m2_sr(const physics::FogLight<double>& light, double above_w_m2_sr,

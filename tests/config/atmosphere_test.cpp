@@ -250,9 +250,9 @@ TEST_F(ConfigTest, fog_is_read_and_printed_and_shades_the_models_of_the_clear_sk
   EXPECT_EQ(second->atmosphere.fog, loaded->atmosphere.fog);
   EXPECT_EQ(print_scenario(*second), printed);
   // What a weather table measured has the fog in it.
-  const auto measured = scenario(
-      kFog + std::string("[[weather.sample]]\ntime_s = 0\ndni_w_m2 = 0\ndhi_w_m2 = 90\n"
-                         "longwave_down_w_m2 = 370\nair_k = 284\nwind_m_s = 1\n"));
+  const auto measured =
+      scenario(kFog + std::string("[[weather.sample]]\ntime_s = 0\ndni_w_m2 = 0\ndhi_w_m2 = 90\n"
+                                  "longwave_down_w_m2 = 370\nair_k = 284\nwind_m_s = 1\n"));
   ASSERT_TRUE(measured) << measured.error().text;
   EXPECT_TRUE(measured->atmosphere.fog);
   EXPECT_FALSE(measured->clear_sky.fog);
@@ -266,7 +266,8 @@ TEST_F(ConfigTest, faults_of_fog_name_file_and_key) {
   using ::testing::HasSubstr;
   const std::string kind = "[atmosphere.fog]\nkind = \"heavy_advection\"\n";
   EXPECT_THAT(fault("[atmosphere.fog]\nkind = \"smog\"\nvisibility_m = 50\ntop_m = 9\n"),
-              ::testing::AllOf(HasSubstr(".toml:"), HasSubstr("'kind' is 'smog', must be one of: heavy_adv")));
+              ::testing::AllOf(HasSubstr(".toml:"),
+                               HasSubstr("'kind' is 'smog', must be one of: heavy_adv")));
   EXPECT_THAT(fault(kind + "top_m = 9\n"), HasSubstr("visibility_m"));
   EXPECT_THAT(fault(kind + "visibility_m = 50\n"), HasSubstr("top_m"));
   EXPECT_THAT(fault(kind + "visibility_m = 5\ntop_m = 9\n"), HasSubstr("'visibility_m' is 5"));

@@ -83,8 +83,8 @@ Sums sums_at(FogKind kind, double wavelength_um) {
   Sums out;
   for (int i = 0; i < kRadii; ++i) {
     const double radius_um = first_um * std::pow(last_um / first_um, (i + 0.5) / kRadii);
-    const double weight = std::pow(radius_um, of.power + 3.0) *
-                          std::exp(-of.rate * std::pow(radius_um, of.bend));
+    const double weight =
+        std::pow(radius_um, of.power + 3.0) * std::exp(-of.rate * std::pow(radius_um, of.bend));
     const MieEfficiencies one = mie_efficiencies(2.0 * kPi * radius_um / wavelength_um,
                                                  water.refractive_index, water.extinction_index);
     out.extinction += weight * one.extinction;
@@ -130,8 +130,8 @@ FogOptics fog_optics(const Fog& fog, const Band& band) {
   }
   // A response that lies between the points has the wavelength in the middle.
   if (!(weights > 0.0)) return fog_optics_at(fog, 0.5 * (band.lo_um + band.hi_um));
-  return optics_of(fog, {sums.extinction / weights, sums.scattering / weights,
-                         sums.forward / weights});
+  return optics_of(fog,
+                   {sums.extinction / weights, sums.scattering / weights, sums.forward / weights});
 }
 
 FogLight<double> fog_light(const FogOptics& optics, double depth_m,
@@ -143,8 +143,8 @@ FogLight<double> fog_light(const FogOptics& optics, double depth_m,
   out.depth_m = std::max(depth_m, 0.0);
   // By similarity the scattering is even all around, and J'' = rate^2 (J - B) - 3 F / (4 pi) by the
   // depth, with the flux F that the direct sun loses to scattering.
-  const double albedo = optics.albedo_frac * (1.0 - optics.asymmetry) /
-                        (1.0 - optics.albedo_frac * optics.asymmetry);
+  const double albedo =
+      optics.albedo_frac * (1.0 - optics.asymmetry) / (1.0 - optics.albedo_frac * optics.asymmetry);
   const double rate = std::sqrt(3.0 * (1.0 - albedo));
   const double depth = out.wide_per_m * out.depth_m;
   double steepness = 1.0 / std::max(arrivals.sin_sun, kLowestSun);
@@ -153,8 +153,8 @@ FogLight<double> fog_light(const FogOptics& optics, double depth_m,
   const double sun = -3.0 * lost_w_m2_sr / (steepness * steepness - rate * rate);
   // What goes down at the top is the sky's, what goes up at the ground is the ground's.
   const double sun_at_ground = std::exp(-steepness * depth);
-  const double top = arrivals.sky_w_m2_sr - arrivals.black_w_m2_sr -
-                     (1.0 + 2.0 / 3.0 * steepness) * sun;
+  const double top =
+      arrivals.sky_w_m2_sr - arrivals.black_w_m2_sr - (1.0 + 2.0 / 3.0 * steepness) * sun;
   const double ground = arrivals.ground_w_m2_sr - arrivals.black_w_m2_sr -
                         (1.0 - 2.0 / 3.0 * steepness) * sun * sun_at_ground;
   const double near = 1.0 + 2.0 / 3.0 * rate;
@@ -185,8 +185,8 @@ double fog_sunlight_frac(const FogShade& shade, double sin_elevation) noexcept {
   // that goes on about as before counted as not scattered (delta-Eddington).
   const double g = shade.sun_asymmetry;
   const double depth = (1.0 - g * g) * shade.sun_depth;
-  const double below = (2.0 / 3.0 + sin_elevation) +
-                       (2.0 / 3.0 - sin_elevation) * std::exp(-depth / sin_elevation);
+  const double below =
+      (2.0 / 3.0 + sin_elevation) + (2.0 / 3.0 - sin_elevation) * std::exp(-depth / sin_elevation);
   return below / (4.0 / 3.0 + (1.0 - g) * shade.sun_depth);
 }
 
@@ -204,8 +204,7 @@ double longwave_above_fog_w_m2(const FogShade& shade, double ground_w_m2, double
                                double clear_w_m2) noexcept {
   const double through = shade.longwave_through_frac;
   const double black_w_m2 = kStefanBoltzmannWPerM2K4 * std::pow(air_k, 4.0);
-  const double above_w_m2 =
-      (ground_w_m2 - (1.0 - through) * black_w_m2) / std::max(through, 1e-6);
+  const double above_w_m2 = (ground_w_m2 - (1.0 - through) * black_w_m2) / std::max(through, 1e-6);
   return std::max(above_w_m2, std::min(ground_w_m2, clear_w_m2));
 }
 

@@ -53,8 +53,8 @@ MieEfficiencies mie_efficiencies(double size_parameter, double refractive_index,
     out.scattering += (2.0 * n + 1.0) * (std::norm(a) + std::norm(b));
     out.asymmetry += (2.0 * n + 1.0) / (n * (n + 1.0)) * (a * std::conj(b)).real();
     if (i > 1) {
-      out.asymmetry += (n - 1.0) * (n + 1.0) / n *
-                       (a_before * std::conj(a) + b_before * std::conj(b)).real();
+      out.asymmetry +=
+          (n - 1.0) * (n + 1.0) / n * (a_before * std::conj(a) + b_before * std::conj(b)).real();
     }
     a_before = a;
     b_before = b;

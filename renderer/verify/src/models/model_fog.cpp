@@ -18,8 +18,8 @@ physics::Result<std::string> run_fog_path(const EvaluateRequest&, const physics:
   if (!kinds) return tl::unexpected(std::move(kinds.error()));
   auto bands = table.texts("band");
   if (!bands) return tl::unexpected(std::move(bands.error()));
-  const auto columns = read_columns<5>(
-      table, {"visibility_m", "top_m", "h_sensor_m", "h_target_m", "range_m"});
+  const auto columns =
+      read_columns<5>(table, {"visibility_m", "top_m", "h_sensor_m", "h_target_m", "range_m"});
   if (!columns) return tl::unexpected(columns.error());
   const auto& [visibility_m, top_m, sensor_m, target_m, range_m] = *columns;
   const auto fault = [&](std::size_t row, std::string_view column, std::string_view text,
@@ -54,8 +54,8 @@ physics::Result<std::string> run_fog_path(const EvaluateRequest&, const physics:
       continue;
     }
     const double climb = range_m[i] > 0.0 ? (target_m[i] - sensor_m[i]) / range_m[i] : 0.0;
-    const auto fog = physics::fog_stretch(top_m[i] - sensor_m[i], std::clamp(climb, -1.0, 1.0),
-                                          range_m[i]);
+    const auto fog =
+        physics::fog_stretch(top_m[i] - sensor_m[i], std::clamp(climb, -1.0, 1.0), range_m[i]);
     out[3][i] = fog.begin_m;
     out[4][i] = fog.length_m;
     out[5][i] = std::exp(-optics.extinction_per_m * fog.length_m);

@@ -59,8 +59,8 @@ struct FogOptics {
 };
 /// Returns the optics of a fog at one wavelength, 0.2 to 50 um. Setup only: some milliseconds.
 [[nodiscard]] FogOptics fog_optics_at(const Fog& fog, double wavelength_um);
-/// Returns the optics of a fog in a band, with the spectrum of a blackbody of 285 K as weight. Setup
-/// only: some tens of milliseconds. @pre the band is valid
+/// Returns the optics of a fog in a band, with the spectrum of a blackbody of 285 K as weight.
+/// Setup only: some tens of milliseconds. @pre the band is valid
 [[nodiscard]] FogOptics fog_optics(const Fog& fog, const Band& band);
 
 /// Part of a line of sight that lies in the fog.
@@ -109,9 +109,9 @@ struct FogLight {
 /// Returns the light of a layer of a depth by two streams. RT-safe.
 [[nodiscard]] FogLight<double> fog_light(const FogOptics& optics, double depth_m,
                                          const FogArrivals& arrivals) noexcept;
-/// Returns what a stretch of fog sends to the end at which it begins, W m-2 sr-1, for one of the two
-/// extinctions (physics.md eq. 93). The stretch begins `below_top_m` below the top and rises with
-/// the sine of the elevation. The twin in GLSL is lib/fog.glsl. RT-safe.
+/// Returns what a stretch of fog sends to the end at which it begins, W m-2 sr-1, for one of the
+/// two extinctions (physics.md eq. 93). The stretch begins `below_top_m` below the top and rises
+/// with the sine of the elevation. The twin in GLSL is lib/fog.glsl. RT-safe.
 template <class Number>
 [[nodiscard]] Number fog_glow_w_m2_sr(const FogLight<Number>& light, Number extinction_per_m,
                                       Number below_top_m, Number sin_elevation,
@@ -123,8 +123,8 @@ template <class Number>
   const auto part = [&](Number begin_log, Number end_log) {
     const Number x = depth + begin_log - end_log;
     const Number size = std::abs(x);
-    const Number mean = size < Number(1e-3) ? Number(1) - Number(0.5) * size
-                                            : (Number(1) - std::exp(-size)) / size;
+    const Number mean =
+        size < Number(1e-3) ? Number(1) - Number(0.5) * size : (Number(1) - std::exp(-size)) / size;
     return depth * mean * (x < Number(0) ? through * std::exp(end_log) : std::exp(begin_log));
   };
   const auto from_top = [&](Number rate_per_m) {
@@ -143,8 +143,8 @@ inline constexpr double kFogFarM = 1e8;
 
 /// What a layer of fog does to sun and sky on the ground below it.
 struct FogShade {
-  double sun_depth = 0.0;           ///< optical depth of the layer, straight down, at 0.55 um
-  double sun_asymmetry = 0.0;       ///< mean cosine of the sunlight that it scatters
+  double sun_depth = 0.0;              ///< optical depth of the layer, straight down, at 0.55 um
+  double sun_asymmetry = 0.0;          ///< mean cosine of the sunlight that it scatters
   double longwave_through_frac = 1.0;  ///< share of the sky's long-wave irradiance that passes
 
   [[nodiscard]] bool operator==(const FogShade&) const = default;

@@ -31,18 +31,18 @@ TEST(Mie, SpheresScatterAsPublished) {
   EXPECT_NEAR(printed.scattering, 3.10543, 5e-6);
   // Wiscombe 1979 (NCAR/TN-140+STR), test cases of MIEV0: scattering and asymmetry, and extinction
   // where it differs.
-  for (const PublishedSphere& s : std::vector<PublishedSphere>{
-           {10, 0.75, 0, 2.232265, 2.232265, 0.896473},
-           {1000, 0.75, 0, 1.997908, 1.997908, 0.844944},
-           {1, 1.33, 1e-5, 0.093952, 0.093923, 0.184517},
-           {100, 1.33, 1e-5, 2.101321, 2.096594, 0.868959},
-           {10000, 1.33, 1e-5, 2.004089, 1.723857, 0.907840},
-           {1, 1.5, 1, 2.336321, 0.663454, 0.192136},
-           {100, 1.5, 1, 2.097502, 1.283697, 0.850252},
-           {10000, 1.5, 1, 2.004368, 1.236574, 0.846310},
-           {1, 10, 10, 2.532993, 2.049405, -0.110664},
-           {100, 10, 10, 2.071124, 1.836785, 0.556215},
-           {10000, 10, 10, 2.005914, 1.795393, 0.548194}}) {
+  for (const PublishedSphere& s :
+       std::vector<PublishedSphere>{{10, 0.75, 0, 2.232265, 2.232265, 0.896473},
+                                    {1000, 0.75, 0, 1.997908, 1.997908, 0.844944},
+                                    {1, 1.33, 1e-5, 0.093952, 0.093923, 0.184517},
+                                    {100, 1.33, 1e-5, 2.101321, 2.096594, 0.868959},
+                                    {10000, 1.33, 1e-5, 2.004089, 1.723857, 0.907840},
+                                    {1, 1.5, 1, 2.336321, 0.663454, 0.192136},
+                                    {100, 1.5, 1, 2.097502, 1.283697, 0.850252},
+                                    {10000, 1.5, 1, 2.004368, 1.236574, 0.846310},
+                                    {1, 10, 10, 2.532993, 2.049405, -0.110664},
+                                    {100, 10, 10, 2.071124, 1.836785, 0.556215},
+                                    {10000, 10, 10, 2.005914, 1.795393, 0.548194}}) {
     const auto found = mie_efficiencies(s.size, s.n, s.k);
     EXPECT_NEAR(found.extinction, s.extinction, 1.5e-6) << s.size << ' ' << s.n;
     EXPECT_NEAR(found.scattering, s.scattering, 1.5e-6) << s.size << ' ' << s.n;
@@ -59,8 +59,7 @@ struct FogRow {
   double um, extinction, absorption, asymmetry;
 };
 
-void expect_rows(FogKind kind, const std::vector<FogRow>& rows, double relative,
-                 double asymmetry) {
+void expect_rows(FogKind kind, const std::vector<FogRow>& rows, double relative, double asymmetry) {
   const Fog fog{kind, kKoschmieder, 50.0};
   for (const FogRow& row : rows) {
     const FogOptics found = fog_optics_at(fog, row.um);
@@ -236,8 +235,8 @@ TEST(Fog, SkyAndGroundShineThroughALayerAsPhotonsWalk) {
         }
         const Ends level = walk(of, top_m, 2.0, 0.0, 150.0);
         EXPECT_NEAR(level.target, std::exp(-of.extinction_per_m * 150.0), 0.01) << name;
-        level_worst = std::max(
-            level_worst, std::abs(share_of(of, top_m, 2.0, 0.0, 150.0, true) - level.sky));
+        level_worst =
+            std::max(level_worst, std::abs(share_of(of, top_m, 2.0, 0.0, 150.0, true) - level.sky));
         const Ends down = walk(of, top_m, top_m - 1e-6, -0.5, 2.0 * top_m);
         down_worst = std::max(
             down_worst, std::abs(share_of(of, top_m, top_m, -0.5, 2.0 * top_m, true) - down.sky));
@@ -288,8 +287,7 @@ TEST(Fog, GlowIsTheSumOfShortStretches) {
         sum += std::exp(-per_m * i * piece_m) *
                fog_glow_w_m2_sr(light, per_m, begin_m - sine * i * piece_m, sine, piece_m);
       }
-      EXPECT_NEAR(fog_glow_w_m2_sr(light, per_m, begin_m, sine, length_m) / sum, 1.0, 1e-6)
-          << sine;
+      EXPECT_NEAR(fog_glow_w_m2_sr(light, per_m, begin_m, sine, length_m) / sum, 1.0, 1e-6) << sine;
       // In float32 as the shader has it.
       const FogLight<float> single{
           static_cast<float>(light.extinction_per_m), static_cast<float>(light.wide_per_m),
