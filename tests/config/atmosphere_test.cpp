@@ -249,7 +249,7 @@ TEST_F(ConfigTest, fog_is_read_and_printed_and_shades_the_models_of_the_clear_sk
   ASSERT_TRUE(second) << second.error().text;
   EXPECT_EQ(second->atmosphere.fog, loaded->atmosphere.fog);
   EXPECT_EQ(print_scenario(*second), printed);
-  // What a weather table measured has the fog in it.
+  // A weather table was measured below the fog.
   const auto measured =
       scenario(kFog + std::string("[[weather.sample]]\ntime_s = 0\ndni_w_m2 = 0\ndhi_w_m2 = 90\n"
                                   "longwave_down_w_m2 = 370\nair_k = 284\nwind_m_s = 1\n"));

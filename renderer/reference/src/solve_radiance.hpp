@@ -47,7 +47,7 @@ class BandIntegral {
                                                          double dew_point_k, double cover_frac,
                                                          const physics::CloudBase& base);
 
-/// What fog leaves and finds at the ground.
+/// Sun and temperature at the ground below fog.
 struct UnderFog {
   double beam_frac = 1.0;  ///< share of the direct sun above it that is left
   double ground_k = 0.0;   ///< temperature of the ground that lights it

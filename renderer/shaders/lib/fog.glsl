@@ -15,8 +15,8 @@ vec2 fog_stretch(float above_m, float sin_elevation, float range_m) {
   return vec2(begin_m, range_m - begin_m);
 }
 
-// What fog sends of a part of its light that has the logarithms `begin_log` and `end_log` at the two ends of a stretch of an
-// optical depth, and is exponential in between.
+// Returns the share of a part of the fog's light that a stretch of an optical depth sends to its begin. The part has the
+// logarithms `begin_log` and `end_log` at its two ends, and is exponential in between.
 float fog_part(float depth, float through, float begin_log, float end_log) {
   float x = depth + begin_log - end_log;
   float size = abs(x);
@@ -24,7 +24,7 @@ float fog_part(float depth, float through, float begin_log, float end_log) {
   return depth * mean * (x < 0.0 ? through * exp(end_log) : exp(begin_log));
 }
 
-// What a stretch of fog sends to the end at which it begins, `below_top_m` below the top, W m-2 sr-1 (physics.md eq. 93).
+// Returns what a stretch of fog sends to its begin, `below_top_m` below the top, W m-2 sr-1 (physics.md eq. 93).
 // `light` has the radiances of physics::FogLight: blackbody, sky, ground and sun; `rates` its rates by height, that of the
 // sun's part second, and the depth of the layer over the ground.
 float fog_glow_w_m2_sr(vec4 light, vec3 rates, float per_m, float below_top_m, float sin_elevation, float length_m) {

@@ -141,7 +141,7 @@ FogLight<double> fog_light(const FogOptics& optics, double depth_m,
   out.wide_per_m = optics.wide_extinction_per_m();
   out.black_w_m2_sr = arrivals.black_w_m2_sr;
   out.depth_m = std::max(depth_m, 0.0);
-  // By similarity the scattering is even all around, and J'' = rate^2 (J - B) - 3 F / (4 pi) by the
+  // Similarity makes the scattering even all around: J'' = rate^2 (J - B) - 3 F / (4 pi) by the
   // depth, with the flux F that the direct sun loses to scattering.
   const double albedo =
       optics.albedo_frac * (1.0 - optics.asymmetry) / (1.0 - optics.albedo_frac * optics.asymmetry);
@@ -151,7 +151,7 @@ FogLight<double> fog_light(const FogOptics& optics, double depth_m,
   if (std::abs(steepness - rate) < 1e-3) steepness = rate + 1e-3;  // the two must not be the same
   const double lost_w_m2_sr = albedo * arrivals.sun_w_m2 / (4.0 * kPi);
   const double sun = -3.0 * lost_w_m2_sr / (steepness * steepness - rate * rate);
-  // What goes down at the top is the sky's, what goes up at the ground is the ground's.
+  // Meet the sky's light at the top, where it goes down, and the ground's at the ground.
   const double sun_at_ground = std::exp(-steepness * depth);
   const double top =
       arrivals.sky_w_m2_sr - arrivals.black_w_m2_sr - (1.0 + 2.0 / 3.0 * steepness) * sun;

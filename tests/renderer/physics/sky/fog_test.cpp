@@ -202,7 +202,7 @@ Ends walk(const FogOptics& of, double top_m, double height_m, double sine, doubl
   return ends;
 }
 
-/// What the layer's light says of the share of the sky or the ground in a line of sight.
+/// Share of the sky or the ground in a line of sight by the light of the layer.
 double share_of(const FogOptics& of, double top_m, double height_m, double sine, double range_m,
                 bool sky) {
   const auto light =
@@ -215,7 +215,7 @@ double share_of(const FogOptics& of, double top_m, double height_m, double sine,
 }
 
 TEST(Fog, SkyAndGroundShineThroughALayerAsPhotonsWalk) {
-  // Where no photon ends at the sky or the ground, the fog looks like a blackbody. Errors are
+  // The fog looks like a blackbody where no photon ends at the sky or the ground. Errors are
   // therefore shares of the difference between a blackbody and the sky.
   for (const Band& band : {Band{3.0, 5.0, {}}, Band{8.0, 12.0, {}}}) {
     double sky_square = 0.0;
@@ -288,7 +288,7 @@ TEST(Fog, GlowIsTheSumOfShortStretches) {
                fog_glow_w_m2_sr(light, per_m, begin_m - sine * i * piece_m, sine, piece_m);
       }
       EXPECT_NEAR(fog_glow_w_m2_sr(light, per_m, begin_m, sine, length_m) / sum, 1.0, 1e-6) << sine;
-      // In float32 as the shader has it.
+      // Compare it in float32, as the shader has it.
       const FogLight<float> single{
           static_cast<float>(light.extinction_per_m), static_cast<float>(light.wide_per_m),
           static_cast<float>(light.black_w_m2_sr),    static_cast<float>(light.sky_w_m2_sr),
@@ -363,7 +363,7 @@ TEST(Fog, TheClearSkysModelsHaveItsShade) {
   const double black = kStefanBoltzmannWPerM2K4 * std::pow(clear.air_k, 4.0);
   EXPECT_GT(below.longwave_down_w_m2, clear.longwave_down_w_m2);
   EXPECT_LT(below.longwave_down_w_m2, black);
-  // What is known at the ground leads back to what arrives above the fog.
+  // Values at the ground lead back to those above the fog.
   EXPECT_NEAR(longwave_above_fog_w_m2(*model.fog, below.longwave_down_w_m2, clear.air_k, 0.0),
               clear.longwave_down_w_m2, 1e-6);
   EXPECT_NEAR(beam_above_fog_frac(*model.fog, fog_beam_frac(*model.fog, sun.direction_enu.z) * 0.7,

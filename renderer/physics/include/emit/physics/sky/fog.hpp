@@ -45,7 +45,7 @@ struct Fog {
 /// Optical depth of a path at which 2 % of a contrast are left (Koschmieder 1924): ln 50.
 inline constexpr double kKoschmieder = 3.912023005428146;
 
-/// What droplets do to light, as means over a band.
+/// Extinction and scattering by droplets, as means over a band.
 struct FogOptics {
   double extinction_per_m = 0.0;
   double albedo_frac = 0.0;  ///< share of the extinction that is scattering
@@ -83,7 +83,7 @@ template <class Number>
   const Number begin_m = above_m / sin_elevation;
   return {begin_m, range_m - begin_m};
 }
-/// What arrives at a layer of fog in a band.
+/// Light that arrives at a layer of fog in a band.
 struct FogArrivals {
   double black_w_m2_sr = 0.0;   ///< radiance of a blackbody as warm as the fog
   double sky_w_m2_sr = 0.0;     ///< mean of the sky above it, by the cosine
@@ -141,7 +141,7 @@ template <class Number>
 /// Range of a line of sight that meets no surface, m: what of it lies in fog is as good as endless.
 inline constexpr double kFogFarM = 1e8;
 
-/// What a layer of fog does to sun and sky on the ground below it.
+/// Effect of a layer of fog on sun and sky at the ground below it.
 struct FogShade {
   double sun_depth = 0.0;              ///< optical depth of the layer, straight down, at 0.55 um
   double sun_asymmetry = 0.0;          ///< mean cosine of the sunlight that it scatters
