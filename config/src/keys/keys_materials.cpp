@@ -261,13 +261,11 @@ const KeyTable<Material>& material_keys() {
                        "rough, concrete medium_rough, fabric medium_smooth, painted metal smooth, "
                        "glass very_smooth, water open_water."),
       number<Material>("leaf_width_m", "m", above_to(0.0, 1.0), EMIT_FIELD(leaf_width_m),
-                       "foster: width of the leaves, needles or strips of which the surface "
-                       "consists: their film takes the place of that of `roughness`. Without it "
-                       "the surface is closed."),
+                       "foster: width of leaves, needles or strips. Their film takes the place of "
+                       "that of `roughness`. Without it the surface is closed."),
       number<Material>("leaf_area_index", "", between(0.1, 10), EMIT_FIELD(leaf_area_index),
-                       "foster: area of the leaves in view, one side, by that of the surface: 2 "
-                       "of a crown with leaves at all angles, 1 of a net. It goes with "
-                       "`leaf_width_m`."),
+                       "foster: area of these leaves, one side, by that of the surface: 2 of a "
+                       "crown, 1 of a net."),
       written_if([](const Material& in) { return !in.layers.empty(); },
                  choice<Material>(
                      "base",
@@ -312,8 +310,7 @@ const KeyTable<Material>& material_keys() {
                        "sand, 10 of clay. It makes the store that of soil."),
       boolean<Material>("dry_layers_valid", EMIT_FIELD(dry_layers_valid),
                         "`false` says that heat also moves by melting, stirring or other "
-                        "evaporation. Temperatures are then a guide only: a warning says so, and "
-                        "frames carry `degraded`."),
+                        "evaporation. Temperatures are a guide only, and frames say so."),
       number<Material>(
           "prescribed_k", "K", between(100, 5000), EMIT_FIELD(prescribed_k),
           "Given temperature of a part, such as a hot engine. It has no thermal simulation."),
