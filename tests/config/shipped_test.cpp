@@ -123,7 +123,7 @@ TEST_F(ConfigTest, the_shipped_library_is_complete_and_consistent) {
     EXPECT_EQ(moist, !scene::moisture_of(material).dry()) << material.name;
     const bool leafy = material.name == "foliage" || material.name.starts_with("canopy_") ||
                        material.name == "camouflage_net";
-    EXPECT_EQ(leafy, material.leaf_width_m > 0.0) << material.name;
+    EXPECT_EQ(leafy, material.leaf_width_m.has_value()) << material.name;
   }
 }
 

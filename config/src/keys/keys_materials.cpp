@@ -265,7 +265,7 @@ const KeyTable<Material>& material_keys() {
                        "that of `roughness`. Without it the surface is closed."),
       number<Material>("leaf_area_index", "", between(0.1, 10), EMIT_FIELD(leaf_area_index),
                        "foster: area of these leaves, one side, by that of the surface: 2 of a "
-                       "crown, 1 of a net."),
+                       "crown, 1 of a net. Without it 2 counts."),
       written_if([](const Material& in) { return !in.layers.empty(); },
                  choice<Material>(
                      "base",

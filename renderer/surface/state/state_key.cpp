@@ -76,8 +76,9 @@ std::uint64_t scene_hash(const scene::ScenarioDesc& scenario,
 void add_material(Fnv64& hash, const scene::Material& material) {
   add(hash, material.solar_absorptance_frac, material.emissivity_frac, material.base_k,
       material.layers.size(), material.foster_modes.size(), material.modes.size(), material.sheet,
-      material.rests_on_body(), material.roughness, material.leaf_width_m);
-  if (material.leaf_width_m > 0.0) add(hash, material.leaf_area_index);
+      material.rests_on_body(), material.roughness);
+  add_optional(hash, material.leaf_width_m);
+  add_optional(hash, material.leaf_area_index);
   for (const scene::Layer& layer : material.layers) {
     add(hash, layer.thickness_m, layer.conductivity_w_m_k, layer.density_kg_m3,
         layer.specific_heat_j_kg_k);

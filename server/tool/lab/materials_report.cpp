@@ -156,8 +156,9 @@ void add_rows(TextTable& table, std::span<const MaterialEntry> entries) {
   row("  spectrum", [](const MaterialEntry& e) { return spectrum_text(e.material); });
   row("roughness", [](const MaterialEntry& e) {
     const Material& m = e.material;
-    if (m.leaf_width_m > 0.0) {
-      return fmt::format("leaves {:.3g} m, x {:g}", m.leaf_width_m, m.leaf_area_index);
+    if (m.leaf_width_m) {
+      return fmt::format("leaves {:.3g} m, x {:g}", *m.leaf_width_m,
+                         m.leaf_area_index.value_or(2.0));
     }
     return std::string(kRoughnesses.at(static_cast<std::size_t>(m.roughness)));
   });

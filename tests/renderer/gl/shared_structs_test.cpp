@@ -127,7 +127,7 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
       radiance->uniform_offset("band_uniforms[2].air_view_first"),
       static_cast<GLint>(2 * sizeof(gpu::BandParams) + offsetof(gpu::BandParams, air_view_first)));
   // Check tables that shaders fetch as texels of four floats.
-  EXPECT_EQ(sizeof(gpu::MaterialParams), 5U * 16U);
+  EXPECT_EQ(sizeof(gpu::MaterialParams), 6U * 16U);
   EXPECT_EQ(offsetof(gpu::MaterialParams, initial_offset_k), 16U);
   EXPECT_EQ(offsetof(gpu::MaterialParams, base_offset_k), 28U);
   EXPECT_EQ(offsetof(gpu::MaterialParams, resistance_m2k_w), 32U);

@@ -8,6 +8,7 @@
 #include <map>
 #include <numbers>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -80,15 +81,29 @@ struct Case {
 };
 constexpr Case kCases[] = {{0, 1.0}, {0, 0.2}, {1, 1.0}, {1, 0.6}, {2, 1.0}, {2, 0.3}};
 
+/// What hides the sky above level ground.
+enum class Hidden : std::uint8_t {
+  surroundings,  ///< they reflect sunlight and have a temperature of their own
+  shade,         ///< it is dark and as warm as the air
+};
+
 /// Returns the temperatures at the ends of the hours of a day after so many equal days from 284 K,
 /// by the solver of layers.
-std::vector<double> after_days(const Case& at, std::int64_t days) {
+std::vector<double> after_days(const Case& at, Hidden hidden, std::int64_t days) {
   scene::ScenarioDesc scenario = equal_days(-days, 1);
   scenario.thermal.history_start_ns = -days * kOneDayNs;
   const reference::SurfaceClimate climate = equal_climate(scenario, kOneDayNs);
   std::vector<std::int64_t> times;
   for (std::int64_t hour = 0; hour <= 24; ++hour) times.push_back(hour * kOneHourNs);
-  const std::vector<reference::ViewSample> view{{0, 1.0, at.sky_frac}};
+  std::vector<reference::ViewSample> view{{0, 1.0, at.sky_frac}};
+  if (hidden == Hidden::shade) {
+    view.clear();
+    for (const physics::WeatherSample& row : scenario.weather) {
+      const double frac = 1.0 - at.sky_frac;
+      view.push_back({row.sim_time_ns, 1.0, at.sky_frac, frac, 0.0,
+                      frac * physics::kStefanBoltzmannWPerM2K4 * std::pow(row.air_k, 4.0)});
+    }
+  }
   const auto kelvin =
       point_history(climate, scenario.materials[at.material], 284.0, kLevel, view, times);
   EXPECT_TRUE(kelvin.has_value());
@@ -96,17 +111,17 @@ std::vector<double> after_days(const Case& at, std::int64_t days) {
 }
 
 /// Returns what is left after so many days that no start counts.
-const std::vector<double>& truth_of(const Case& at) {
-  static std::map<std::pair<std::size_t, double>, std::vector<double>> known;
-  std::vector<double>& out_k = known[{at.material, at.sky_frac}];
-  if (out_k.empty()) out_k = after_days(at, 250);
+const std::vector<double>& truth_of(const Case& at, Hidden hidden) {
+  static std::map<std::tuple<std::size_t, double, Hidden>, std::vector<double>> known;
+  std::vector<double>& out_k = known[{at.material, at.sky_frac, hidden}];
+  if (out_k.empty()) out_k = after_days(at, hidden, 250);
   return out_k;
 }
 
 class BalancedStart : public ::testing::TestWithParam<Case> {};
 
 TEST_P(BalancedStart, IsWhatHundredsOfEqualDaysLeaveInTheReference) {
-  const std::vector<double>& truth_k = truth_of(GetParam());
+  const std::vector<double>& truth_k = truth_of(GetParam(), Hidden::surroundings);
   // A day is spin-up in one run, and history in the other.
   for (const bool spins_up : {false, true}) {
     scene::ScenarioDesc from = equal_days(-2, 1);
@@ -128,7 +143,7 @@ TEST_P(BalancedStart, IsWhatHundredsOfEqualDaysLeaveInTheReference) {
 }
 
 TEST_P(BalancedStart, IsWhatHundredsOfEqualDaysLeaveInTheRenderer) {
-  const std::vector<double>& truth_k = truth_of(GetParam());
+  const std::vector<double>& truth_k = truth_of(GetParam(), Hidden::shade);
   constexpr double kReferenceK = 300.0;
   const scene::ScenarioDesc scenario = equal_days(-1, 2);
   const auto day = day_of(scenario);
@@ -178,9 +193,13 @@ TEST(BalancedStartOfFaces, IsTheSteadyStateWithoutADay) {
         const double t =
             kReferenceK + physics::foster_offset_k(states.at_start(m, up, 0.0, sky_frac), surface);
         const renderer::SurfaceForcing& now = day->front().begin;
+        // What hides the sky above the horizon is as warm as the air and reflects nothing.
+        const double ground_frac = std::min(1.0 - sky_frac, 0.5 - 0.5 * up);
+        const double above_frac = 1.0 - sky_frac - ground_frac;
         const double in_w_m2 =
-            0.9 * (sky_frac * 300.0 + (1.0 - sky_frac) * now.reflected_w_m2) +
-            0.93 * (sky_frac * now.longwave_w_m2 + (1.0 - sky_frac) * now.environment_w_m2) +
+            0.9 * (sky_frac * 300.0 + ground_frac * now.reflected_w_m2) +
+            0.93 * (sky_frac * now.longwave_w_m2 + ground_frac * now.environment_w_m2 +
+                    above_frac * physics::kStefanBoltzmannWPerM2K4 * std::pow(now.air_k, 4.0)) +
             12.0 * (now.air_k - t) - 0.93 * physics::kStefanBoltzmannWPerM2K4 * std::pow(t, 4.0);
         const double down_w_m2 = (t - material.base_k) / material.network.resistance_m2k_w();
         EXPECT_NEAR(in_w_m2, down_w_m2, 0.2) << m << " " << sky_frac << " " << up;

@@ -177,7 +177,7 @@ TEST(Film, KeepsLeavesWithinKelvinsOfTheAir) {
   leaves.wetness_frac = 1.0;
   leaves.surface_resistance_s_m = 100.0;
   leaves.night_resistance_s_m = 1000.0;
-  const auto above_air_k = [&](double width_m) {
+  const auto above_air_k = [&](std::optional<double> width_m) {
     scene::Material material = leaves;
     material.leaf_width_m = width_m;
     const auto k =
@@ -186,7 +186,7 @@ TEST(Film, KeepsLeavesWithinKelvinsOfTheAir) {
     return std::pair((*k)[0] - climate->at(times_ns[0]).air_k,
                      (*k)[1] - climate->at(times_ns[1]).air_k);
   };
-  const auto [closed_k, closed_night_k] = above_air_k(0.0);
+  const auto [closed_k, closed_night_k] = above_air_k(std::nullopt);
   const auto [broad_k, broad_night_k] = above_air_k(0.06);
   const auto [needle_k, needle_night_k] = above_air_k(0.01);
   std::printf(

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Thick ground under a roof begins in the balance of its own shade. A hundred days of shaded history
-// from a stated temperature judge that: they share the steps of the history, but neither the start
-// nor the assumption that the days before were like the first one.
+// Thick ground under a roof begins in the balance of its own shade. A hundred days of shaded
+// history from a stated temperature judge that: they share the steps of the history, but neither
+// the start nor the assumption that the days before were like the first one.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -133,7 +133,7 @@ TEST(RendererFoster, LeavesFollowTheModelInDoubleAndStayNearTheAir) {
   const auto pose = looking({0.0, -5.0, 5.0}, {0.0, 0.0, 0.0});
   for (const double hours : {0.0, 3.5}) {
     const auto now_ns = static_cast<std::int64_t>(hours * static_cast<double>(kHourNs));
-    scenario.materials[0].leaf_width_m = 0.0;
+    scenario.materials[0].leaf_width_m.reset();
     const double closed_k = expected_k(scenario, now_ns, {0.0, 0.0, 1.0});
     scenario.materials[0].leaf_width_m = 0.05;
     const double expected = expected_k(scenario, now_ns, {0.0, 0.0, 1.0});

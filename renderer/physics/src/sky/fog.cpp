@@ -47,8 +47,15 @@ constexpr double kLongwaveLastUm = 50.0;
 constexpr double kDiffusivity = 1.66;
 /// Sine of the lowest elevation of the sun in a layer without a horizon.
 constexpr double kLowestSun = 0.02;
-/// Share of the direct sun below which the beam above the fog cannot be inferred.
-constexpr double kKnownBeamFrac = 1e-3;
+/// Below the first share of what the fog lets through, the weather at the ground says nothing of
+/// the sky above: errors of a few per cent of the measurement would be all of it. From the second
+/// one on it is believed.
+constexpr double kUnknownFrac = 0.03;
+constexpr double kKnownFrac = 0.1;
+/// Returns how far the weather at the ground is believed, 0..1.
+double known_frac(double through) noexcept {
+  return std::clamp((through - kUnknownFrac) / (kKnownFrac - kUnknownFrac), 0.0, 1.0);
+}
 
 /// Refractive index of liquid water after Hale and Querry (1973), also where the table of surfaces
 /// does not reach.
@@ -197,15 +204,19 @@ double fog_skylight_frac(const FogShade& shade) noexcept {
 double beam_above_fog_frac(const FogShade& shade, double ground_frac, double sin_elevation,
                            double unknown_frac) noexcept {
   const double through = fog_beam_frac(shade, sin_elevation);
-  return through < kKnownBeamFrac ? unknown_frac : std::min(1.2, ground_frac / through);
+  if (!(through > kUnknownFrac)) return unknown_frac;
+  return std::lerp(unknown_frac, std::min(1.2, ground_frac / through), known_frac(through));
 }
 
 double longwave_above_fog_w_m2(const FogShade& shade, double ground_w_m2, double air_k,
                                double clear_w_m2) noexcept {
   const double through = shade.longwave_through_frac;
+  if (!(through > kUnknownFrac)) return clear_w_m2;
   const double black_w_m2 = kStefanBoltzmannWPerM2K4 * std::pow(air_k, 4.0);
-  const double above_w_m2 = (ground_w_m2 - (1.0 - through) * black_w_m2) / std::max(through, 1e-6);
-  return std::max(above_w_m2, std::min(ground_w_m2, clear_w_m2));
+  const double above_w_m2 = (ground_w_m2 - (1.0 - through) * black_w_m2) / through;
+  const double bounded_w_m2 = std::clamp(above_w_m2, std::min(ground_w_m2, clear_w_m2),
+                                         std::max({black_w_m2, ground_w_m2, clear_w_m2}));
+  return std::lerp(clear_w_m2, bounded_w_m2, known_frac(through));
 }
 
 }  // namespace emit::physics

@@ -373,6 +373,15 @@ TEST(Fog, TheClearSkysModelsHaveItsShade) {
   model.fog = fog_shade({FogKind::heavy_advection, 20.0, 500.0});
   const Forcing dark = forcing_from_clear_sky(model, place, sun, kNoonNs);
   EXPECT_LT(dark.direct_normal_w_m2, 1e-9);
+  // A few W m-2 of error at the ground say nothing of the sky above it, whatever the fog.
+  for (const double visibility_m : {20.0, 50.0, 100.0, 300.0, 1000.0, 10'000.0}) {
+    const FogShade shade = fog_shade({FogKind::heavy_advection, visibility_m, 50.0});
+    for (const double error_w_m2 : {-8.0, -1.0, 0.0, 1.0, 8.0}) {
+      const double above = longwave_above_fog_w_m2(shade, black + error_w_m2, clear.air_k, 300.0);
+      EXPECT_GE(above, 299.9) << visibility_m << " m, " << error_w_m2 << " W/m2";
+      EXPECT_LE(above, std::max(black, black + error_w_m2) + 1e-9) << visibility_m;
+    }
+  }
   EXPECT_NEAR(dark.longwave_down_w_m2, black, 0.01);
 }
 

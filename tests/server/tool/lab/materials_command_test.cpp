@@ -40,7 +40,8 @@ TEST(CliMaterials, lists_the_shipped_library_by_family_with_its_uncertainty) {
   const TemporaryFolder folder;
   const ProcessResult result = run_emit({"materials", "--json", folder.file("m.json")});
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  for (const char* text : {"roofing:", "vegetation:", "vehicle_black", "0.93 +-0.05", "snow_old *"}) {
+  for (const char* text :
+       {"roofing:", "vegetation:", "vehicle_black", "0.93 +-0.05", "snow_old *"}) {
     EXPECT_NE(result.out.find(text), std::string::npos) << text << "\n" << result.out;
   }
   const std::string json = read_text(folder.file("m.json"));

@@ -132,10 +132,10 @@ struct Material {
   double solar_absorptance_frac = 0.0;            ///< absorbed share of sunlight: 1 - albedo
   double emissivity_frac = 0.0;                   ///< total hemispherical, long-wave
   Roughness roughness = Roughness::medium_rough;  ///< as the wind feels it; emit2014 ignores it
-  /// Width of the leaves, needles or strips of which the surface consists; 0: it is closed.
-  double leaf_width_m = 0.0;
-  /// Area of leaves, one side, by that of the surface.
-  double leaf_area_index = 2.0;
+  /// Width of the leaves, needles or strips of which the surface consists; absent: it is closed.
+  std::optional<double> leaf_width_m;
+  /// Area of leaves, one side, by that of the surface; absent: that of leaves at all angles.
+  std::optional<double> leaf_area_index;
   std::vector<BandEmissivity> band_emissivity;  ///< bands not listed use emissivity_frac
   EmissivitySpectrum emissivity_spectrum;       ///< source of both; may be empty
   std::vector<Layer> layers;                    ///< outermost first; emit2014 uses the first only
@@ -200,8 +200,10 @@ struct Material {
 
 /// Returns what the film of the air takes from a material.
 [[nodiscard]] inline physics::FilmSkin film_skin(const Material& material) noexcept {
-  if (material.leaf_width_m > 0.0) {
-    return physics::leaf_skin(material.leaf_width_m, material.leaf_area_index);
+  constexpr double kAllAngles = 2.0;
+  if (material.leaf_width_m) {
+    return physics::leaf_skin(*material.leaf_width_m,
+                              material.leaf_area_index.value_or(kAllAngles));
   }
   return roughness_factor(material.roughness);
 }

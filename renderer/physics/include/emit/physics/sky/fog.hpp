@@ -159,12 +159,15 @@ struct FogShade {
 /// Returns the same for the light of an even sky. RT-safe.
 [[nodiscard]] double fog_skylight_frac(const FogShade& shade) noexcept;
 /// Returns the share of a clear sky's direct sun that shines on the fog, where `ground_frac` of it
-/// is left at the ground. Where the fog lets less than 1e-3 through, it is `unknown_frac`. RT-safe.
+/// is left at the ground. Where the fog lets less than 3 % through, it is `unknown_frac`, and it
+/// goes over to the weather's up to 10 %. RT-safe.
 [[nodiscard]] double beam_above_fog_frac(const FogShade& shade, double ground_frac,
                                          double sin_elevation, double unknown_frac) noexcept;
 /// Returns the sky's long-wave irradiance on the fog, W m-2, where `ground_w_m2` arrives below it
 /// and the air at the ground has `air_k`. It is not below `clear_w_m2`, that of a clear sky, unless
-/// the irradiance at the ground already is. RT-safe.
+/// the irradiance at the ground already is, and not above that of a blackbody as warm as the air,
+/// unless the irradiance at the ground is. Where the fog lets less than 3 % through, it is
+/// `clear_w_m2`, and it goes over to the weather's up to 10 %. RT-safe.
 [[nodiscard]] double longwave_above_fog_w_m2(const FogShade& shade, double ground_w_m2,
                                              double air_k, double clear_w_m2) noexcept;
 
