@@ -25,8 +25,8 @@ constexpr int kMostDays = 12;
 FosterDrive<double> face_drive(const SurfaceForcing& f, const FosterMaterial& material, double up,
                                double sun_share, double sky_frac, double reference_k,
                                double offset_k) noexcept {
-  // What hides the sky above the horizon stands in its own shade: it sends no sunlight, and is as
-  // warm as the air.
+  // Whatever hides the sky above the horizon is in its own shade: it is as warm as the air, and no
+  // sunlight comes from it.
   const double ground_frac = std::min(1.0 - sky_frac, 0.5 * (1.0 - up));
   const double short_wave_w_m2 = sun_share * glm::length(f.sun_w_m2) + sky_frac * f.diffuse_w_m2 +
                                  ground_frac * f.reflected_w_m2;

@@ -14,7 +14,7 @@ vec4 material_resistance_m2k_w(int material, int group) {
   return texelFetch(material_table, material * EMIT_MATERIAL_TEXELS + 2 + group);
 }
 
-// What a material gives to the film of its faces: its roughness factor, and the two numbers of its leaves.
+// A material gives three numbers to the film of its faces: its roughness factor and two of its leaves.
 vec3 material_skin(int material) {
   return vec3(texelFetch(material_table, material * EMIT_MATERIAL_TEXELS + 4).x,
               texelFetch(material_table, material * EMIT_MATERIAL_TEXELS + 5).xy);

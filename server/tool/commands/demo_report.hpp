@@ -11,7 +11,7 @@
 
 namespace emit::tool {
 
-/// What a run of the demo found out, and how it is told.
+/// The results hold all that a run of the demo found out.
 struct DemoResults {
   std::string scenario;
   std::string device;
@@ -41,8 +41,8 @@ struct DemoClientView {
 [[nodiscard]] std::vector<std::string> demo_losses(const std::vector<DemoClientView>& clients,
                                                    std::vector<std::string>& warnings);
 
-/// What the demo promises to show and did not: at least three frames, one of them after an entity
-/// has left where the scenario has a departure. One line each; empty when all was shown.
+/// The demo promises at least three frames, one of them after an entity has left where the scenario
+/// has a departure. Each promise that it did not keep is one line; none is left when all was shown.
 [[nodiscard]] std::vector<std::string> demo_shortfalls(const DemoResults& results,
                                                        const std::vector<Departure>& departures);
 

@@ -75,7 +75,7 @@ class LatencyProbe {
  private:
   /// Sends the next pose, with the marker as it stands; the instant before it went.
   Result<std::int64_t> send();
-  /// Until `wanted` says yes to a frame, or the time is over: null.
+  /// Waits until `wanted` says yes to a frame; it returns null when the time is over.
   template <class Wanted>
   Result<const client::ReceivedFrame*> wait(std::int64_t end_ns, Wanted wanted);
   Result<void> learn_marker();
@@ -221,7 +221,7 @@ Result<void> LatencyProbe::run(Progress& progress) {
   std::uniform_real_distribution<double> spread(0.5, 1.5);
   auto next_ns = static_cast<double>(client::monotonic_now_ns());
   for (std::uint64_t i = 0; i < command_.frames && !InterruptGuard::interrupted(); ++i) {
-    // At no fixed phase to any clock of the daemon, so that waiting for a slot is sampled evenly.
+    // The pose has no fixed phase to any clock of the daemon, so that waits for a slot are even.
     next_ns = std::max(next_ns, static_cast<double>(client::monotonic_now_ns()) - 1e9) +
               spread(random_) * 1e9 / command_.rate_hz;
     const auto idle = wait(static_cast<std::int64_t>(next_ns), [](const auto&) { return false; });

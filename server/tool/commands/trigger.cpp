@@ -65,7 +65,7 @@ int run(const TriggerOptions& command) {
         static_cast<std::int64_t>(static_cast<double>(trigger.number) * 1e9 / command.rate_hz);
     const timespec due{static_cast<time_t>(due_ns / 1'000'000'000),
                        static_cast<long>(due_ns % 1'000'000'000)};
-    // By an absolute timer: a late trigger does not delay those behind it.
+    // The timer is absolute, so that a late trigger does not delay those behind it.
     if (::clock_nanosleep(CLOCK_TAI, TIMER_ABSTIME, &due, nullptr) == EINTR) continue;
     ++trigger.number;
     trigger.edge_ns = command.stamp || seal ? clock.tai_ns() : 0;

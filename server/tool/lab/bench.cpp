@@ -9,7 +9,7 @@
 namespace emit::tool {
 namespace {
 
-/// In the order of `emit bench --help`.
+/// The suites stand in the order of `emit bench --help`.
 constexpr void (*kSuites[])(CommandLine&) = {
     add_bench_paper,     add_bench_error,       add_bench_stream,        add_bench_isolation,
     add_bench_stability, add_bench_convergence, add_bench_thermal_truth, add_bench_scaling,

@@ -81,7 +81,7 @@ physics::Result<verify::HistoryOptions> history_options(const EvaluateOptions& c
   if (command.history_model == "emit2014") {
     history.model = verify::HistoryModel::emit2014;
     if (!history.layers.empty()) {
-      // As for a material that states no modes of its own.
+      // The first layer stands for a material that states no modes of its own.
       const verify::HistoryLayer& first = history.layers.front();
       const auto positive = [](double value) { return value > 0.0 && std::isfinite(value); };
       if (positive(first.thickness_m) && positive(first.conductivity_w_m_k) &&

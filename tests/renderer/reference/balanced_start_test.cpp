@@ -81,7 +81,7 @@ struct Case {
 };
 constexpr Case kCases[] = {{0, 1.0}, {0, 0.2}, {1, 1.0}, {1, 0.6}, {2, 1.0}, {2, 0.3}};
 
-/// What hides the sky above level ground.
+/// The tests know two kinds of things that hide the sky above level ground.
 enum class Hidden : std::uint8_t {
   surroundings,  ///< they reflect sunlight and have a temperature of their own
   shade,         ///< it is dark and as warm as the air
@@ -193,7 +193,7 @@ TEST(BalancedStartOfFaces, IsTheSteadyStateWithoutADay) {
         const double t =
             kReferenceK + physics::foster_offset_k(states.at_start(m, up, 0.0, sky_frac), surface);
         const renderer::SurfaceForcing& now = day->front().begin;
-        // What hides the sky above the horizon is as warm as the air and reflects nothing.
+        // Things that hide the sky above the horizon are as warm as the air and reflect nothing.
         const double ground_frac = std::min(1.0 - sky_frac, 0.5 - 0.5 * up);
         const double above_frac = 1.0 - sky_frac - ground_frac;
         const double in_w_m2 =

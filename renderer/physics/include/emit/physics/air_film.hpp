@@ -87,7 +87,7 @@ struct AirFilm {
 /// Returns the film between `a` (f = 0) and `b` (f = 1), linear in every coefficient.
 [[nodiscard]] AirFilm between_films(const AirFilm& a, const AirFilm& b, double f) noexcept;
 
-/// What the film of a face takes from its material.
+/// The film of a face takes these numbers from its material.
 struct FilmSkin {
   /// A number is the factor R of physics.md eq. 34: 1 for a smooth face.
   constexpr FilmSkin(double roughness_factor = 1.0) noexcept : roughness(roughness_factor) {}
