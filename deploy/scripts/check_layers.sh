@@ -13,7 +13,8 @@ layers='
 renderer/physics:
 renderer/image: renderer/physics
 renderer/scene: renderer/physics
-renderer/scene/src/gltf: renderer/scene renderer/physics
+renderer/scene/src/cut: renderer/scene renderer/physics
+renderer/scene/src/gltf: renderer/scene renderer/scene/src/cut renderer/physics
 renderer/scene/src: renderer/scene renderer/scene/src/gltf renderer/physics
 renderer/scene/generate: renderer/physics
 renderer/threads: renderer/physics

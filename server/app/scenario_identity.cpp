@@ -9,6 +9,8 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <optional>
+#include <string_view>
 #include <vector>
 
 #include "app/scenario_identity.hpp"
@@ -98,26 +100,37 @@ std::string percent_decoded(const std::string& uri) {
   return out;
 }
 
-/// Returns the files with the geometry of a glTF file that are not part of it. Images are not
-/// followed, because nothing is rendered from them.
-Result<std::vector<fs::path>> buffer_files(const fs::path& gltf) {
+/// Returns the file beside a glTF file that an element of it names; nothing where its content is
+/// part of the glTF file.
+std::optional<fs::path> file_of(const google::protobuf::Struct& element, const fs::path& gltf) {
+  const auto uri = element.fields().find("uri");
+  if (uri == element.fields().end() || uri->second.string_value().empty() ||
+      uri->second.string_value().starts_with("data:")) {
+    return std::nullopt;
+  }
+  return (gltf.parent_path() / percent_decoded(uri->second.string_value())).lexically_normal();
+}
+
+/// Returns the files of a glTF model beside it: its geometry, and those of its images that are
+/// there. Images cut out surfaces and give them materials.
+Result<std::vector<fs::path>> files_beside(const fs::path& gltf) {
   std::vector<fs::path> out;
   google::protobuf::Struct root;
   if (const auto status = google::protobuf::util::JsonStringToMessage(json_of(gltf), &root);
       !status.ok()) {
     return make_error(ErrorCode::parse, fmt::format("{}: {}", gltf.string(), status.ToString()));
   }
-  const auto buffers = root.fields().find("buffers");
-  if (buffers == root.fields().end()) return out;
-  for (const auto& buffer : buffers->second.list_value().values()) {
-    const auto& fields = buffer.struct_value().fields();
-    const auto uri = fields.find("uri");
-    if (uri == fields.end() || uri->second.string_value().empty() ||
-        uri->second.string_value().starts_with("data:")) {
-      continue;
+  for (const char* const kind : {"buffers", "images"}) {
+    const auto list = root.fields().find(kind);
+    if (list == root.fields().end()) continue;
+    for (const auto& element : list->second.list_value().values()) {
+      const auto file = file_of(element.struct_value(), gltf);
+      std::error_code code;
+      if (!file || (kind == std::string_view("images") && !fs::is_regular_file(*file, code))) {
+        continue;
+      }
+      out.push_back(*file);
     }
-    out.push_back(
-        (gltf.parent_path() / percent_decoded(uri->second.string_value())).lexically_normal());
   }
   return out;
 }
@@ -143,6 +156,9 @@ Result<ScenarioIdentity> identify_scenario(const scene::ScenarioDesc& scenario) 
   plain.thermal.state_file.clear();  // holds what the rest makes, nothing of its own
   for (auto& object : plain.objects) {
     object.gltf = label_of(object.gltf, folder);
+    for (auto& image : object.material_images) {
+      if (!image.image.empty()) image.image = label_of(image.image, folder);
+    }
   }
   for (auto& channel : plain.channels) {
     for (fs::path* file : files_of(channel.output)) {
@@ -156,12 +172,15 @@ Result<ScenarioIdentity> identify_scenario(const scene::ScenarioDesc& scenario) 
         !done) {
       return tl::unexpected<physics::Error>(std::move(done.error()));
     }
-    auto buffers = buffer_files(object.gltf);
-    if (!buffers) {
-      return tl::unexpected<physics::Error>(std::move(buffers.error()));
+    auto beside = files_beside(object.gltf);
+    if (!beside) {
+      return tl::unexpected<physics::Error>(std::move(beside.error()));
     }
-    for (const fs::path& buffer : *buffers) {
-      if (auto done = hash_file(buffer, label_of(buffer, folder), hash, identity.files); !done) {
+    for (const auto& image : object.material_images) {
+      if (!image.image.empty()) beside->push_back(image.image);
+    }
+    for (const fs::path& file : *beside) {
+      if (auto done = hash_file(file, label_of(file, folder), hash, identity.files); !done) {
         return tl::unexpected<physics::Error>(
             std::move(done.error()).with_context(object.gltf.string()));
       }

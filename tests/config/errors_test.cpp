@@ -22,6 +22,9 @@ std::string material(const std::string& more) {
 std::string part(const std::string& keys) {
   return object("entity_id = 7\n[[object.parts]]\nname = \"a\"\n" + keys);
 }
+std::string image(const std::string& keys) {
+  return object("[[object.material_images]]\nmaterial = \"Body\"\n" + keys);
+}
 const std::string kLayer =
     "layers = [{ thickness_m = 0.1, conductivity_w_m_k = 1, density_kg_m3 = 2000, "
     "specific_heat_j_kg_k = 900 }]\n";
@@ -84,6 +87,24 @@ const std::vector<Case>& cases() {
        "s.toml:4:12: there is no material 'concret', did you mean 'concrete'?"},
       {"material_map", object("material_map = { body = \"gold\" }\n"),
        "s.toml:4:25: there is no material 'gold'"},
+      {"image_colour", image("legend = { \"green\" = \"concrete\" }\n"),
+       "s.toml:6:22: 'legend': 'green' is not a colour, must be \"#rrggbb\" in hexadecimal digits"},
+      {"image_colour_digits", image("legend = { \"#12345g\" = \"concrete\" }\n"),
+       "s.toml:6:24: 'legend': '#12345g' is not a colour, must be \"#rrggbb\" in hexadecimal "
+       "digits"},
+      {"image_colour_twice",
+       image("legend = { \"#0000AA\" = \"concrete\", \"#0000aa\" = \"concrete\" }\n"),
+       "s.toml:6:10: 'legend' has a colour twice"},
+      {"image_legend_empty", image("legend = {}\n"),
+       "s.toml:6:10: 'legend' has 0 colours, must have 1 to 64"},
+      {"image_without_legend", image(""), "s.toml:4:1: key 'legend' is missing"},
+      {"image_material", image("legend = { \"#123456\" = \"concret\" }\n"),
+       "s.toml:6:24: there is no material 'concret', did you mean 'concrete'?"},
+      {"image_twice",
+       image("legend = { \"#123456\" = \"concrete\" }\n") +
+           "[[object.material_images]]\nmaterial = \"Body\"\n"
+           "legend = { \"#123456\" = \"concrete\" }\n",
+       "s.toml:8:12: material 'Body' has two images"},
       {"parts_of_scenery", object("parts = [{ name = \"a\", material = \"concrete\" }]\n"),
        "s.toml:4:9: 'parts' needs an entity_id: static scenery does not heat itself"},
       {"part_material", part("material = \"gold\"\n"), "s.toml:7:12: there is no material 'gold'"},
@@ -468,6 +489,15 @@ TEST_F(ConfigTest, a_missing_gltf_is_reported_where_it_is_named) {
   options_.require_scene_files = true;
   EXPECT_EQ(scenario_error("[[object]]\ngltf = \"none.glb\"\n"),
             "s.toml:3:8: 'gltf': none.glb: no such file");
+}
+
+TEST_F(ConfigTest, a_missing_image_of_materials_is_reported_where_it_is_named) {
+  options_.require_scene_files = true;
+  write("box.glb", "");
+  EXPECT_EQ(scenario_error("[[object]]\ngltf = \"box.glb\"\n[[object.material_images]]\n"
+                           "material = \"Body\"\nimage = \"none.png\"\n"
+                           "legend = { \"#123456\" = \"concrete\" }\n"),
+            "s.toml:6:9: 'image': none.png: no such file");
 }
 
 TEST_F(ConfigTest, a_missing_file_of_an_output_is_reported_where_it_is_named) {

@@ -157,6 +157,11 @@ heading_deg = 123.4
 pitch_deg = 5.0
 roll_deg = -6.0
 material_map = { body = "hot", "wheel left" = "concrete" }
+[[object.material_images]]
+material = "Body"
+image = "parts.png"
+legend = { "#4A5d23" = "hot", "#000000" = "concrete" }
+smallest_patch_px = 8
 [[object]]
 name = "jet"
 gltf = "jet.glb"
@@ -324,6 +329,9 @@ TEST_F(ConfigTest, every_scenario_key_reaches_its_field) {
   EXPECT_EQ(s.objects[1].entity_id, 11U);
   EXPECT_FALSE(s.objects[1].on);
   EXPECT_EQ(s.objects[1].material_map.at("wheel left"), "concrete");
+  const scene::MaterialImage image{
+      "Body", folder_ / "parts.png", {{{0, 0, 0}, "concrete"}, {{0x4a, 0x5d, 0x23}, "hot"}}, 8};
+  EXPECT_EQ(s.objects[1].material_images, std::vector{image});
   ASSERT_EQ(s.objects[2].trajectory.size(), 2U);
   EXPECT_FALSE(s.objects[2].trajectory[0].on);
   EXPECT_TRUE(s.objects[2].trajectory[1].teleport);

@@ -124,6 +124,7 @@ struct DaemonHead {
 [[nodiscard]] const KeyTable<scene::SmokeDesc>& smoke_keys();
 [[nodiscard]] const KeyTable<scene::FireDesc>& fire_keys();
 [[nodiscard]] const KeyTable<InstanceDraft>& instance_keys();
+[[nodiscard]] const KeyTable<scene::MaterialImage>& material_image_keys();
 [[nodiscard]] const KeyTable<KeyframeDraft>& keyframe_keys();
 [[nodiscard]] const KeyTable<PartCommandDraft>& part_command_keys();
 [[nodiscard]] const KeyTable<PartDraft>& part_keys();

@@ -1,5 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstdint>
+#include <string_view>
 
 #include "emit/physics/constants.hpp"
 #include "keys.hpp"
@@ -101,6 +107,16 @@ Key<ObjectDraft> model_rotation() {
       });
 }
 
+/// Reads "#rrggbb"; false: the text is something else.
+bool read_colour(std::string_view text, std::array<std::uint8_t, 3>& rgb) {
+  if (text.size() != 7 || text[0] != '#') return false;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const char* first = text.data() + 1 + 2 * i;
+    if (std::from_chars(first, first + 2, rgb[i], 16).ptr != first + 2) return false;
+  }
+  return true;
+}
+
 template <class T>
 void append_trajectory_keys(KeyTable<T>& keys) {
   keys.push_back(custom<T>(
@@ -125,6 +141,47 @@ const KeyTable<InstanceDraft>& instance_keys() {
     append_pose_keys<InstanceDraft>(table, EMIT_FIELD(pose), "the instance");
     return table;
   }();
+  return keys;
+}
+
+const KeyTable<scene::MaterialImage>& material_image_keys() {
+  using scene::MaterialImage;
+  static const KeyTable<MaterialImage> keys = {
+      required(text<MaterialImage>("material", EMIT_FIELD(gltf_material),
+                                   "glTF material whose surfaces the image parts.")),
+      path<MaterialImage>("image", EMIT_FIELD(image),
+                          "PNG or JPEG image, which lies on the surface as the base colour of the "
+                          "file does. Absent: that base colour."),
+      required(custom<MaterialImage>(
+          {"legend", "table", "", "1 to 64 colours",
+           "Colour of the image (`\"#rrggbb\"`, sRGB) = material of the library.", false},
+          [](MaterialImage& out, const Node& node, Diagnostics& diagnostics) {
+            if (!expect_table(node, "legend", diagnostics)) return;
+            for (const Member& member : node.members) {
+              scene::MaterialColour colour;
+              if (!read_colour(member.key, colour.rgb)) {
+                diagnostics.add(member.value.at, fmt::format("'legend': '{}' is not a colour, must "
+                                                             "be \"#rrggbb\" in hexadecimal digits",
+                                                             member.key));
+                continue;
+              }
+              read_text(member.value, member.key, colour.material, diagnostics);
+              out.legend.push_back(std::move(colour));
+            }
+            std::ranges::sort(out.legend);
+          },
+          [](const MaterialImage& in) -> std::optional<std::string> {
+            std::string out = "{";
+            for (const scene::MaterialColour& colour : in.legend) {
+              out += fmt::format("{} \"#{:02x}{:02x}{:02x}\" = {}", out.size() > 1 ? "," : "",
+                                 colour.rgb[0], colour.rgb[1], colour.rgb[2],
+                                 toml_string(colour.material));
+            }
+            return out + " }";
+          })),
+      integer<MaterialImage>("smallest_patch_px", "px", 1, 1000000, EMIT_FIELD(smallest_patch_px),
+                             "Patches of fewer texels take the material around them."),
+  };
   return keys;
 }
 
@@ -253,6 +310,16 @@ const KeyTable<ObjectDraft>& object_keys() {
                        toml_string(material);
               }
               return out + " }";
+            }),
+        custom<ObjectDraft>(
+            {"material_images", "array of tables", "", "",
+             "Images that give surfaces several materials; see `material_images` below.", false},
+            [](ObjectDraft& out, const Node& node, Diagnostics& diagnostics) {
+              read_array(node, "material_images", material_image_keys(), scene::MaterialImage{},
+                         out.desc.material_images, diagnostics);
+            },
+            [](const ObjectDraft& in) {
+              return write_array(in.desc.material_images, material_image_keys());
             }),
         number<ObjectDraft>("scale", "", above_to(0, 1e6), EMIT_FIELD(desc.scale),
                             "Uniform scale of the geometry."),

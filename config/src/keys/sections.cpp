@@ -59,6 +59,10 @@ const std::vector<SectionDoc>& scenario_sections() {
       section_doc("object", true, "A glTF file placed in the world.", object_keys(), ObjectDraft{}),
       section_doc("object.instances", true, "One placement of an object that does not move.",
                   instance_keys(), InstanceDraft{}),
+      section_doc("object.material_images", true,
+                  "An image whose colours give the surfaces of one glTF material several materials "
+                  "([materials by image](../renderer/docs/material_images.md)).",
+                  material_image_keys(), scene::MaterialImage{}),
       section_doc("object.trajectory", true,
                   "A keyframe of an object or of the sensor (`[[sensor.trajectory]]`). The first "
                   "pose holds before it, the last one after it.",

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <glm/geometric.hpp>
+#include <set>
+#include <string>
 
 #include "resolve.hpp"
 
@@ -224,6 +226,50 @@ std::vector<scene::PartDesc> resolve_parts(const ObjectDraft& draft, const Node&
   return out;
 }
 
+/// Reports images of materials that no scene can have.
+void check_material_images(const ObjectDesc& desc, const Node& node,
+                           const std::vector<Material>& materials, bool require_files,
+                           Diagnostics& diagnostics) {
+  const Node* images = node.find("material_images");
+  if (images == nullptr || images->kind != Node::Kind::array) return;
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < std::min(images->items.size(), desc.material_images.size()); ++i) {
+    const Node& item = images->items[i];
+    const scene::MaterialImage& image = desc.material_images[i];
+    if (image.gltf_material.empty() && item.has("material")) {
+      diagnostics.add(key_location(item, "material"),
+                      "'material' must name a material of the glTF file");
+    } else if (!names.insert(image.gltf_material).second) {
+      diagnostics.add(key_location(item, "material"),
+                      fmt::format("material '{}' has two images", image.gltf_material));
+    }
+    std::error_code code;
+    if (require_files && !image.image.empty() &&
+        !std::filesystem::is_regular_file(image.image, code)) {
+      diagnostics.add(key_location(item, "image"),
+                      fmt::format("'image': {}: no such file", image.image.string()));
+    }
+    const Node* legend = item.find("legend");
+    if (legend == nullptr || legend->kind != Node::Kind::table) continue;
+    constexpr std::size_t kMostColours = 64;
+    if (legend->members.empty() || legend->members.size() > kMostColours) {
+      diagnostics.add(key_location(item, "legend"),
+                      fmt::format("'legend' has {} colours, must have 1 to {}",
+                                  legend->members.size(), kMostColours));
+    }
+    for (std::size_t k = 0; k + 1 < image.legend.size(); ++k) {
+      if (image.legend[k].rgb == image.legend[k + 1].rgb) {
+        diagnostics.add(key_location(item, "legend"), "'legend' has a colour twice");
+      }
+    }
+    for (const Member& member : legend->members) {
+      if (member.value.kind == Node::Kind::text) {
+        check_material_name(member.value.text, materials, member.value.at, diagnostics);
+      }
+    }
+  }
+}
+
 ObjectDesc resolve_object(const Node& node, const std::vector<ObjectDesc>& before,
                           const std::vector<Material>& materials, bool require_files,
                           Diagnostics& diagnostics) {
@@ -263,6 +309,7 @@ ObjectDesc resolve_object(const Node& node, const std::vector<ObjectDesc>& befor
       check_material_name(desc.material_map[member.key], materials, member.value.at, diagnostics);
     }
   }
+  check_material_images(desc, node, materials, require_files, diagnostics);
   desc.trajectory = resolve_trajectory(draft.trajectory, draft.trajectory_file, node, diagnostics);
   if (desc.entity_id == 0) {
     for (const std::string_view key : {"trajectory", "trajectory_file"}) {

@@ -14,8 +14,10 @@
 #include <utility>
 
 #include "coplanar.hpp"
+#include "emit/physics/nearest_name.hpp"
 #include "facing.hpp"
 #include "gltf/gltf_file.hpp"
+#include "gltf/gltf_image.hpp"
 #include "gltf/gltf_mesh.hpp"
 #include "gltf/gltf_nodes.hpp"
 
@@ -78,6 +80,26 @@ class MeshStore {
     return stored;
   }
 
+  /// Reads the images that give surfaces several materials, and adds these to the model.
+  /// Errors name the material: config, and those of CutOuts::add_regions().
+  Result<void> add_images(std::span<const MaterialImage> images) {
+    const std::size_t count = model_.materials.size();
+    for (const MaterialImage& image : images) {
+      bool found = false;
+      for (std::size_t i = 0; i < count; ++i) {
+        if (model_.materials[i].name != image.gltf_material) continue;
+        found = true;
+        if (auto added = add_image(static_cast<std::uint32_t>(i), image); !added) return added;
+      }
+      if (!found) return unknown_material(image.gltf_material, count);
+    }
+    return {};
+  }
+
+  /// True where an image gives the surfaces of a material several ones.
+  [[nodiscard]] bool has_regions(std::uint32_t material) const {
+    return cut_outs_.has_regions(material);
+  }
   /// True where the image of a material shows nothing but the outline that it cuts out.
   [[nodiscard]] bool is_outline(std::uint32_t material) const {
     return cut_outs_.is_outline(material);
@@ -89,6 +111,29 @@ class MeshStore {
     std::optional<std::uint32_t> index;
     std::optional<std::uint32_t> mirrored_index;
   };
+
+  Result<void> add_image(std::uint32_t material, const MaterialImage& image) {
+    const auto first = static_cast<std::uint32_t>(model_.materials.size());
+    if (auto added = cut_outs_.add_regions(material, image, first); !added) {
+      return tl::unexpected(
+          std::move(added.error())
+              .with_context(fmt::format("material_images: material '{}'", image.gltf_material)));
+    }
+    for (const MaterialColour& colour : image.legend) {
+      model_.materials.push_back({fmt::format("{} #{:02x}{:02x}{:02x}", image.gltf_material,
+                                              colour.rgb[0], colour.rgb[1], colour.rgb[2]),
+                                  model_.materials[material].double_sided, colour.material});
+    }
+    return {};
+  }
+
+  [[nodiscard]] Result<void> unknown_material(const std::string& name, std::size_t count) const {
+    std::vector<std::string_view> names;
+    for (std::size_t i = 0; i < count; ++i) names.push_back(model_.materials[i].name);
+    return make_error(ErrorCode::config,
+                      fmt::format("material_images: the file has no material '{}'{}", name,
+                                  physics::did_you_mean(name, names)));
+  }
 
   Result<void> fill(Slot& slot, int mesh, int skin, const glm::dmat4& gltf_from_node) {
     std::optional<SkinPose> pose;
@@ -213,11 +258,11 @@ Result<void> place_mesh(const GltfFile& file, const PlacedNode& placed, MeshStor
   return {};
 }
 
-/// True where images promise more than a surface gets. `outline` is true where the image of the
-/// base colour shows nothing but what it cuts out.
-bool has_texture(const tinygltf::Material& material, bool outline) {
+/// True where images promise more than a surface gets. `is_read` is true where the image of the
+/// base colour shows nothing but what it cuts out, or gives the surface its materials.
+bool has_texture(const tinygltf::Material& material, bool is_read) {
   const auto& pbr = material.pbrMetallicRoughness;
-  for (const int index : {outline ? -1 : pbr.baseColorTexture.index,
+  for (const int index : {is_read ? -1 : pbr.baseColorTexture.index,
                           pbr.metallicRoughnessTexture.index, material.normalTexture.index,
                           material.occlusionTexture.index, material.emissiveTexture.index}) {
     if (index >= 0) return true;
@@ -236,17 +281,19 @@ void warn_of_materials(const GltfFile& file, const MeshStore& store, GltfModel& 
   }
   std::vector<std::string> textured;
   std::vector<std::string> blended;
-  for (std::uint32_t i = 0; i < in_use.size(); ++i) {
+  for (std::uint32_t i = 0; i < file.model.materials.size(); ++i) {
     if (!in_use[i]) continue;
     const tinygltf::Material& material = file.model.materials[i];
     const std::string name = "'" + model.materials[i].name + "'";
-    if (has_texture(material, store.is_outline(i))) textured.push_back(name);
+    const bool is_read = store.has_regions(i) || store.is_outline(i);
+    if (has_texture(material, is_read)) textured.push_back(name);
     if (material.alphaMode == "BLEND") blended.push_back(name);
   }
   if (!textured.empty()) {
     model.warnings.push_back(
         fmt::format("{}: textures only cut out what alphaMode MASK says: the surface of material "
-                    "{} has one set of properties, whatever its images show",
+                    "{} has one set of properties, whatever its images show "
+                    "('material_images' makes materials of their colours)",
                     file.name, list_of(textured)));
   }
   if (!blended.empty()) {
@@ -315,7 +362,7 @@ void separate_coplanar(const GltfFile& file, GltfModel& model) {
   drop_unused(model.meshes, model.placements);
 }
 
-Result<GltfModel> build_model(const GltfFile& file) {
+Result<GltfModel> build_model(const GltfFile& file, std::span<const MaterialImage> images) {
   GltfModel model;
   model.file = file.path;
   model.warnings = file.warnings;
@@ -323,7 +370,8 @@ Result<GltfModel> build_model(const GltfFile& file) {
     const tinygltf::Material& material = file.model.materials[i];
     model.materials.push_back(
         {material.name.empty() ? fmt::format("material {}", i) : material.name,
-         material.doubleSided});
+         material.doubleSided,
+         {}});
   }
   const Result<std::vector<PlacedNode>> nodes = place_nodes(file);
   if (!nodes) {
@@ -331,6 +379,7 @@ Result<GltfModel> build_model(const GltfFile& file) {
   }
   model.nodes = static_cast<std::uint32_t>(nodes->size());
   MeshStore store(file, model);
+  if (auto added = store.add_images(images); !added) return tl::unexpected(added.error());
   std::vector<bool> shown(file.model.meshes.size(), false);
   for (const PlacedNode& placed : *nodes) {
     const int mesh = file.model.nodes[static_cast<std::size_t>(placed.node)].mesh;
@@ -351,14 +400,35 @@ Result<GltfModel> build_model(const GltfFile& file) {
 
 }  // namespace
 
-Result<GltfModel> import_gltf(const std::filesystem::path& file) {
+Result<std::vector<GltfColours>> gltf_colours(const std::filesystem::path& path) {
+  const Result<GltfFile> file = parse_gltf_file(path);
+  if (!file) return tl::unexpected(file.error());
+  constexpr std::size_t kMostColours = 8;
+  std::vector<GltfColours> out;
+  for (std::size_t i = 0; i < file->model.materials.size(); ++i) {
+    const tinygltf::Material& material = file->model.materials[i];
+    const auto use = texture_use(*file, material.pbrMetallicRoughness.baseColorTexture);
+    if (!use) continue;
+    const auto image = read_image(*file, use->image);
+    if (!image) continue;
+    GltfColours colours{material.name.empty() ? fmt::format("material {}", i) : material.name, {}};
+    for (const ColourShare& share : main_colours(image->rgba, kMostColours)) {
+      colours.colours.push_back({share.rgb, share.frac});
+    }
+    out.push_back(std::move(colours));
+  }
+  return out;
+}
+
+Result<GltfModel> import_gltf(const std::filesystem::path& file,
+                              std::span<const MaterialImage> images) {
   // The only exception left is bad_alloc, for a file that claims absurd sizes.
   try {
     const Result<GltfFile> parsed = parse_gltf_file(file);
     if (!parsed) {
       return tl::unexpected(parsed.error());
     }
-    Result<GltfModel> model = build_model(*parsed);
+    Result<GltfModel> model = build_model(*parsed, images);
     if (!model) {
       return tl::unexpected(std::move(model.error()).with_context(file.string()));
     }

@@ -76,8 +76,25 @@ physics::Result<SceneSummary> inspect_gltf(const std::filesystem::path& file,
   };
   std::vector<SceneSummary::MaterialRow> rows;
   for (const GltfMaterial& material : model->materials) {
-    rows.push_back({material.name, in_library(material.name) ? material.name : "",
-                    material.double_sided, 0, 0.0, 0});
+    rows.push_back({material.name,
+                    in_library(material.name) ? material.name : "",
+                    material.double_sided,
+                    0,
+                    0.0,
+                    0,
+                    {}});
+  }
+  if (const auto images = gltf_colours(file)) {
+    for (const GltfColours& image : *images) {
+      const auto row =
+          std::ranges::find(rows, image.gltf_material, &SceneSummary::MaterialRow::gltf_material);
+      if (row == rows.end()) continue;
+      for (const GltfColours::Share& share : image.colours) {
+        row->colours.emplace_back(
+            fmt::format("#{:02x}{:02x}{:02x}", share.rgb[0], share.rgb[1], share.rgb[2]),
+            share.frac);
+      }
+    }
   }
   rows.push_back({});
   std::vector<char> thin;
@@ -154,6 +171,12 @@ std::string to_text(const SceneSummary& summary) {
                        ? fmt::format(", double sided: {} triangles are sheets", row.sheet_triangles)
                    : row.double_sided ? ", double sided"
                                       : "");
+    if (row.colours.empty()) continue;
+    fmt::format_to(put, "    image:");
+    for (const auto& [colour, frac] : row.colours) {
+      fmt::format_to(put, " {} {:.1f} %", colour, 100.0 * frac);
+    }
+    fmt::format_to(put, "\n");
   }
   for (const std::string& warning : summary.warnings) {
     fmt::format_to(put, "warning: {}\n", warning);
@@ -170,11 +193,15 @@ std::string to_json(const SceneSummary& summary) {
   }
   std::vector<std::string> materials;
   for (const SceneSummary::MaterialRow& row : summary.materials) {
+    std::vector<std::string> colours;
+    for (const auto& [colour, frac] : row.colours) {
+      colours.push_back(fmt::format(R"({{"rgb": "{}", "frac": {:.6g}}})", colour, frac));
+    }
     materials.push_back(fmt::format(
-        R"({{"gltf_material": {}, "library_material": {}, "double_sided": {}, "triangles": {}, "area_m2": {:.9g}, "sheet_triangles": {}}})",
+        R"({{"gltf_material": {}, "library_material": {}, "double_sided": {}, "triangles": {}, "area_m2": {:.9g}, "sheet_triangles": {}, "image_colours": [{}]}})",
         quoted(row.gltf_material),
         row.library_material.empty() ? "null" : quoted(row.library_material), row.double_sided,
-        row.triangles, row.area_m2, row.sheet_triangles));
+        row.triangles, row.area_m2, row.sheet_triangles, joined(colours)));
   }
   std::vector<std::string> warnings;
   std::transform(summary.warnings.begin(), summary.warnings.end(), std::back_inserter(warnings),

@@ -20,14 +20,14 @@ using physics::ErrorCode;
 using physics::make_error;
 using physics::Result;
 
-/// One file under one assignment of materials. Objects that agree in both share its meshes.
-struct ModelUse {
+/// A file with the images that give its surfaces several materials.
+struct ModelKey {
   std::filesystem::path file;
-  std::vector<std::size_t> materials;
-  bool operator<(const ModelUse& other) const {
-    return std::tie(file, materials) < std::tie(other.file, other.materials);
-  }
+  std::vector<MaterialImage> images;
+  auto operator<=>(const ModelKey&) const = default;
 };
+/// One model under one assignment of materials. Objects that agree in both share its meshes.
+using ModelUse = std::pair<const GltfModel*, std::vector<std::size_t>>;
 
 class SceneLoader {
  public:
@@ -85,12 +85,12 @@ class SceneLoader {
     return {};
   }
 
-  Result<const GltfModel*> model_of(const std::filesystem::path& file) {
-    const std::filesystem::path key = file.lexically_normal();
+  Result<const GltfModel*> model_of(const ObjectDesc& object) {
+    const ModelKey key{object.gltf.lexically_normal(), object.material_images};
     if (const auto known = models_.find(key); known != models_.end()) {
       return &known->second;
     }
-    Result<GltfModel> model = import_gltf(key);
+    Result<GltfModel> model = import_gltf(key.file, key.images);
     if (!model) {
       return tl::unexpected(std::move(model.error()));
     }
@@ -103,7 +103,7 @@ class SceneLoader {
   /// Index of the model's first mesh in the scene. Until the end of the load, materials of
   /// submeshes are positions in the library.
   std::uint32_t mesh_base(const GltfModel& model, const std::vector<std::size_t>& materials) {
-    const ModelUse use{model.file, materials};
+    const ModelUse use{&model, materials};
     const auto [entry, is_new] =
         bases_.emplace(use, static_cast<std::uint32_t>(geometry_.meshes.size()));
     if (is_new) {
@@ -123,7 +123,7 @@ class SceneLoader {
     if (auto checked = check(object); !checked) {
       return checked;
     }
-    const Result<const GltfModel*> model = model_of(object.gltf);
+    const Result<const GltfModel*> model = model_of(object);
     if (!model) {
       physics::Error error =
           physics::Error(model.error()).with_context(fmt::format("object '{}'", object.name));
@@ -210,7 +210,7 @@ class SceneLoader {
   const ScenarioDesc& scenario_;
   MaterialLookup lookup_;
   SceneGeometry geometry_;
-  std::map<std::filesystem::path, GltfModel> models_;
+  std::map<ModelKey, GltfModel> models_;
   std::map<ModelUse, std::uint32_t> bases_;
   std::set<std::uint32_t> entities_;
 };

@@ -65,7 +65,10 @@ Result<MaterialLookup> MaterialLookup::create(const ScenarioDesc& scenario) {
 
 void MaterialLookup::warn_of_unknown_keys(const ObjectDesc& object, const GltfModel& model) {
   std::vector<std::string_view> names;
-  for (const GltfMaterial& material : model.materials) names.push_back(material.name);
+  for (const GltfMaterial& material : model.materials) {
+    if (material.library.empty()) names.push_back(material.name);
+  }
+  const std::size_t count = names.size();
   for (const auto& [key, material] : object.material_map) {
     // The empty key stands for primitives without material.
     if (key.empty() || std::ranges::count(names, key) > 0) continue;
@@ -76,7 +79,7 @@ void MaterialLookup::warn_of_unknown_keys(const ObjectDesc& object, const GltfMo
       constexpr std::size_t kMaxNames = 8;
       names.resize(std::min(names.size(), kMaxNames));
       hint = fmt::format(": it has '{}'{}", fmt::join(names, "', '"),
-                         model.materials.size() > kMaxNames ? " and more" : "");
+                         count > kMaxNames ? " and more" : "");
     }
     warnings_.push_back(fmt::format("{}: object '{}': material_map: {} has no material '{}'{}",
                                     scenario_->file.string(), object.name,
@@ -100,7 +103,11 @@ Result<std::vector<std::size_t>> MaterialLookup::resolve(std::uint32_t object_in
     const std::string name = i < model.materials.size() ? model.materials[i].name : "";
     MappedBy by = MappedBy::fallback;
     std::string wanted;
-    if (const auto mapped = object.material_map.find(name); mapped != object.material_map.end()) {
+    if (i < model.materials.size() && !model.materials[i].library.empty()) {
+      by = MappedBy::material_image;
+      wanted = model.materials[i].library;
+    } else if (const auto mapped = object.material_map.find(name);
+               mapped != object.material_map.end()) {
       by = MappedBy::material_map;
       wanted = mapped->second;
     } else if (!object.material.empty()) {

@@ -11,10 +11,13 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <unordered_map>
 #include <utility>
 
+#include "../cut/apply_cut_out.hpp"
+#include "../cut/edge_points.hpp"
 #include "emit/physics/check.hpp"
 #include "emit/scene/gltf_import.hpp"
 #include "gltf_accessor.hpp"
@@ -44,15 +47,24 @@ struct Soup {
   std::vector<std::uint32_t> indices;
 };
 
+/// Triangles of a primitive that have one material.
+struct RawPart {
+  std::uint32_t material = kNoGltfMaterial;
+  std::vector<std::uint32_t> indices;  ///< whole triangles
+};
+
 /// A primitive as the file has it, and where it goes.
 struct RawPrimitive {
   std::string context;  ///< "mesh 0 'hangar' primitive 1"
   std::vector<glm::dvec3> positions;
   std::vector<glm::vec3> normals;      ///< empty: to be computed
   std::vector<std::uint32_t> indices;  ///< whole triangles
+  std::vector<RawPart> parts;          ///< of an image of materials; empty: there is none
+  std::vector<EdgePoint> edge_points;  ///< where that image has cut edges
   std::uint32_t material = kNoGltfMaterial;
   bool double_sided = false;
   bool has_indices = false;  ///< false: equal vertices may stand more than once
+  bool is_cut = false;       ///< pieces without area are of the cut, not of the file
   double max_stored = 0.0;   ///< largest coordinate in the file; 0: stored as whole numbers
 };
 
@@ -172,6 +184,30 @@ Soup with_flat_normals(const Soup& soup) {
     }
   }
   return deduplicated(out);
+}
+
+/// Gives the triangles of a primitive without normals those of their own planes, before a cut makes
+/// pieces of them that are too small to have a direction.
+void flatten(RawPrimitive& raw, std::vector<glm::dvec2>& uv) {
+  if (!raw.normals.empty()) return;
+  std::vector<glm::dvec3> positions;
+  std::vector<glm::dvec2> flat_uv;
+  for (std::size_t i = 0; i + 2 < raw.indices.size(); i += 3) {
+    const glm::dvec3& a = raw.positions[raw.indices[i]];
+    const glm::dvec3 area =
+        glm::cross(raw.positions[raw.indices[i + 1]] - a, raw.positions[raw.indices[i + 2]] - a);
+    const double length = glm::length(area);
+    for (std::size_t c = 0; c < 3; ++c) {
+      positions.push_back(raw.positions[raw.indices[i + c]]);
+      flat_uv.push_back(uv[raw.indices[i + c]]);
+      raw.normals.emplace_back(length > 0.0 ? area / length : glm::dvec3(0.0));
+    }
+  }
+  raw.positions = std::move(positions);
+  uv = std::move(flat_uv);
+  raw.indices.resize(raw.positions.size());
+  std::iota(raw.indices.begin(), raw.indices.end(), 0U);
+  raw.has_indices = false;
 }
 
 /// Makes normals unit length. Normals without direction (zero, infinite or not a number) are made
@@ -324,6 +360,77 @@ void append(Mesh& mesh, const Soup& soup, std::uint32_t material, bool double_si
 /// Largest number of indices in a mesh: draw calls count them in 32 bits.
 constexpr std::size_t kMaxMeshIndices = std::size_t{1} << 31U;
 
+/// Cuts a primitive by the mask and by the image of materials that its material has.
+Result<void> cut_primitive(const GltfFile& file, const tinygltf::Primitive& primitive,
+                           CutOuts& cut_outs, RawPrimitive& raw,
+                           std::vector<std::string>& warnings) {
+  const auto warn = [&](const std::string& text) {
+    warnings.push_back(fmt::format("{}: {}: {}", file.name, raw.context, text));
+  };
+  /// Texture coordinates of a cut; none where the primitive has no such attribute.
+  const auto coordinates = [&](const CutOut& cut_out,
+                               const char* otherwise) -> Result<std::vector<glm::dvec2>> {
+    auto uv = read_texture_coordinates(file.model, primitive, cut_out.frame().tex_coord);
+    if (uv && uv->size() != raw.positions.size()) {
+      warn(fmt::format("without TEXCOORD_{}, {}", cut_out.frame().tex_coord, otherwise));
+      uv->clear();
+    }
+    return uv;
+  };
+  CutOut* const mask = cut_outs.mask(raw.material, warnings);
+  RegionCut* const regions = cut_outs.regions(raw.material);
+  std::vector<glm::dvec2> uv;
+  if (mask != nullptr) {
+    auto read = coordinates(*mask, "what its image cuts out is taken as solid");
+    if (!read) return tl::unexpected(std::move(read.error()));
+    uv = std::move(*read);
+  }
+  std::vector<glm::dvec2> region_uv;
+  if (regions != nullptr) {
+    auto read = coordinates(regions->cut_out, "its image of materials has no effect");
+    if (!read) return tl::unexpected(std::move(read.error()));
+    region_uv = std::move(*read);
+  }
+  if (!uv.empty()) {
+    // A mask that shares its coordinates with the image of materials hands them on.
+    const bool same = regions == nullptr || region_uv.empty() || region_uv == uv;
+    flatten(raw, uv);
+    const AppliedCut applied = apply_cut_out(*mask, raw.indices, {raw.positions, raw.normals, uv});
+    for (const std::string& message : applied.messages) warn(message);
+    if (applied.done) {
+      raw.indices = applied.parts.empty() ? std::vector<std::uint32_t>{} : applied.parts[0].indices;
+      raw.is_cut = true;
+    }
+    raw.has_indices = false;
+    if (!same) {
+      warn("its image of materials has no effect, because its mask has other texture coordinates");
+      return {};
+    }
+    if (!region_uv.empty()) region_uv = std::move(uv);
+  }
+  if (region_uv.empty()) return {};
+  flatten(raw, region_uv);
+  AppliedCut applied =
+      apply_cut_out(regions->cut_out, raw.indices, {raw.positions, raw.normals, region_uv});
+  for (const std::string& message : applied.messages) warn(message);
+  if (!applied.done) return {};
+  constexpr double kMaxUnlikeFrac = 0.05;
+  if (applied.unlike_frac > kMaxUnlikeFrac) {
+    warn(
+        fmt::format("{:.0f} % of its surface show colours in '{}' that are unlike all of the "
+                    "legend; each takes the nearest one",
+                    100.0 * applied.unlike_frac, regions->name));
+  }
+  for (CutPart& part : applied.parts) {
+    raw.parts.push_back({regions->first_material + part.part, std::move(part.indices)});
+  }
+  raw.edge_points = std::move(applied.edge_points);
+  raw.indices.clear();
+  raw.has_indices = false;
+  raw.is_cut = true;
+  return {};
+}
+
 /// Reads one primitive; nothing when it is of a kind that is skipped.
 Result<std::optional<RawPrimitive>> read_primitive(const GltfFile& file,
                                                    const tinygltf::Primitive& primitive,
@@ -379,19 +486,8 @@ Result<std::optional<RawPrimitive>> read_primitive(const GltfFile& file,
       return tl::unexpected(checked.error());
     }
   }
-  if (CutOut* cut_out = cut_outs.find(raw.material, warnings)) {
-    const auto uv = read_texture_coordinates(model, primitive, cut_out->mask().tex_coord);
-    if (!uv) return tl::unexpected(uv.error());
-    if (uv->size() != raw.positions.size()) {
-      warn(fmt::format("without TEXCOORD_{}, what its image cuts out is taken as solid",
-                       cut_out->mask().tex_coord));
-      return std::optional<RawPrimitive>{std::move(raw)};
-    }
-    for (const std::string& message :
-         apply_cut_out(*cut_out, *uv, {raw.positions, raw.normals, raw.indices})) {
-      warn(message);
-    }
-    raw.has_indices = false;
+  if (auto cut = cut_primitive(file, primitive, cut_outs, raw, warnings); !cut) {
+    return tl::unexpected(std::move(cut.error()));
   }
   return std::optional<RawPrimitive>{std::move(raw)};
 }
@@ -407,6 +503,9 @@ glm::dvec3 origin_of(const std::vector<RawPrimitive>& primitives) {
   Aabb box;
   for (const RawPrimitive& raw : primitives) {
     for (const std::uint32_t index : raw.indices) box.add(raw.positions[index]);
+    for (const RawPart& part : raw.parts) {
+      for (const std::uint32_t index : part.indices) box.add(raw.positions[index]);
+    }
   }
   glm::dvec3 origin(0.0);
   if (box.empty()) return origin;
@@ -421,21 +520,23 @@ glm::dvec3 origin_of(const std::vector<RawPrimitive>& primitives) {
   return origin;
 }
 
-/// Appends one primitive to the mesh and gives the number of triangles left out.
-Result<std::uint64_t> add_primitive(const GltfFile& file, RawPrimitive raw,
-                                    const glm::dvec3& origin, Mesh& mesh,
-                                    std::vector<std::string>& warnings) {
+/// Appends the triangles of a primitive that have one material to the mesh and gives the number of
+/// those left out.
+Result<std::uint64_t> add_part(const GltfFile& file, const RawPrimitive& raw, RawPart part,
+                               const glm::dvec3& origin, Mesh& mesh,
+                               std::vector<std::string>& warnings) {
   const auto warn = [&](const std::string& text) {
     warnings.push_back(fmt::format("{}: {}: {}", file.name, raw.context, text));
   };
   Soup soup;
-  soup.normals = std::move(raw.normals);
-  soup.indices = std::move(raw.indices);
+  soup.normals = raw.normals;
+  soup.indices = std::move(part.indices);
   soup.positions_m.reserve(raw.positions.size());
   for (const glm::dvec3& position : raw.positions) {
     soup.positions_m.emplace_back(position - origin);
   }
-  const std::uint64_t dropped = drop_zero_area(soup);
+  std::uint64_t dropped = drop_zero_area(soup);
+  if (raw.is_cut) dropped = 0;
   if (dropped > 0) {
     warn(fmt::format("{} triangles of zero area dropped", dropped));
   }
@@ -456,8 +557,38 @@ Result<std::uint64_t> add_primitive(const GltfFile& file, RawPrimitive raw,
   if (mesh.indices.size() + soup.indices.size() > kMaxMeshIndices) {
     return make_error(ErrorCode::unsupported, "more than 2^31 indices in one mesh");
   }
-  append(mesh, soup, raw.material, raw.double_sided);
+  append(mesh, soup, part.material, raw.double_sided);
   return dropped;
+}
+
+/// Appends one primitive to the mesh and gives the number of triangles left out.
+Result<std::uint64_t> add_primitive(const GltfFile& file, RawPrimitive raw,
+                                    const glm::dvec3& origin, Mesh& mesh,
+                                    std::vector<std::string>& warnings) {
+  std::vector<RawPart> parts = std::move(raw.parts);
+  if (parts.empty()) parts.push_back({raw.material, std::move(raw.indices)});
+  std::uint64_t dropped = 0;
+  for (RawPart& part : parts) {
+    const auto added = add_part(file, raw, std::move(part), origin, mesh, warnings);
+    if (!added) return added;
+    dropped += *added;
+  }
+  return dropped;
+}
+
+/// Lets all primitives have the points on their edges that images of materials have cut.
+void share_cut_edges(std::vector<RawPrimitive>& primitives) {
+  const bool is_cut = std::ranges::any_of(
+      primitives, [](const RawPrimitive& raw) { return !raw.edge_points.empty(); });
+  if (!is_cut) return;
+  std::vector<EdgeSurface> surfaces;
+  for (RawPrimitive& raw : primitives) {
+    EdgeSurface surface{raw.positions, raw.normals, raw.edge_points, {}};
+    if (raw.parts.empty()) surface.triangles.push_back(&raw.indices);
+    for (RawPart& part : raw.parts) surface.triangles.push_back(&part.indices);
+    surfaces.push_back(surface);
+  }
+  share_edge_points(surfaces);
 }
 
 }  // namespace
@@ -480,6 +611,7 @@ Result<ConvertedMesh> convert_mesh(const GltfFile& file, int mesh_index, const S
     }
     if (*raw) primitives.push_back(std::move(**raw));
   }
+  share_cut_edges(primitives);
   converted.origin_m = origin_of(primitives);
   for (RawPrimitive& raw : primitives) {
     converted.max_coordinate = std::max(converted.max_coordinate, raw.max_stored);

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "apply_cut_out.hpp"
+#include "cut_outs.hpp"
 #include "emit/scene/mesh.hpp"
 #include "gltf_file.hpp"
 #include "gltf_skin.hpp"
@@ -25,8 +25,9 @@ struct ConvertedMesh {
   std::uint64_t dropped_triangles = 0;
 };
 
-/// Joins the triangle primitives of one glTF mesh, less what alpha masks cut out. `warnings` gets a
-/// line, begun with the file's name, for each primitive or part of one that is left out.
+/// Joins the triangle primitives of one glTF mesh, less what alpha masks cut out, parted by images
+/// of materials. `warnings` gets a line, begun with the file's name, for each primitive or part of
+/// one that is left out.
 ///
 /// @param skin  null: the mesh has no skin. Otherwise its vertices come out in the axes of the
 /// scene.

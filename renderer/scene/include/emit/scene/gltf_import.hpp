@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <array>
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "emit/physics/error.hpp"
 #include "emit/scene/mesh.hpp"
+#include "emit/scene/scene_desc.hpp"
 
 /// glTF 2.0 files (.glb, .gltf with embedded or external buffers) to plain meshes.
 ///
@@ -16,7 +19,8 @@
 /// skins in the pose of the file, doubleSided, EXT_mesh_gpu_instancing, KHR_mesh_quantization and
 /// EXT_meshopt_compression, and surfaces that an alpha mask cuts out (alphaMode MASK, PNG images,
 /// KHR_texture_transform), whose triangles end at the outline of the mask. Missing normals are
-/// computed flat, as the glTF specification asks.
+/// computed flat, as the glTF specification asks. Images may part the surfaces of a material into
+/// several (MaterialImage), along the sides of their texels.
 ///
 /// A warning names points, lines, morph targets, animations, other images, vertex colours and
 /// alphaMode BLEND, none of which is used. An unknown required extension, another version than 2
@@ -33,8 +37,9 @@ inline constexpr std::uint32_t kNoGltfMaterial = 0xffffffffU;
 
 /// A material of the file.
 struct GltfMaterial {
-  std::string name;  ///< "material N" where the file gives none
+  std::string name;  ///< "material N" where the file gives none; with "#rrggbb" for a colour
   bool double_sided = false;
+  std::string library;  ///< material that the legend of an image names; else empty
 };
 
 /// One mesh under one node.
@@ -55,8 +60,26 @@ struct GltfModel {
   std::vector<std::string> warnings;    ///< each begins with the file name
 };
 
-/// Setup only; any thread. Errors name file and element: not_found, io, parse (malformed or
-/// inconsistent), unsupported (required extension).
-[[nodiscard]] physics::Result<GltfModel> import_gltf(const std::filesystem::path& file);
+/// Main colours of the image that a material of a file has for its base colour.
+struct GltfColours {
+  std::string gltf_material;
+  struct Share {
+    std::array<std::uint8_t, 3> rgb{};  ///< sRGB
+    double frac = 0.0;                  ///< share of the texels of the image
+  };
+  std::vector<Share> colours;  ///< the most frequent first
+};
+/// Reads the images of base colours, for legends of MaterialImage. Images that cannot be read are
+/// left out. Setup only; any thread. Errors are those of import_gltf().
+[[nodiscard]] physics::Result<std::vector<GltfColours>> gltf_colours(
+    const std::filesystem::path& file);
+
+/// Setup only; any thread.
+/// @param images  what gives surfaces several materials; each colour of a legend becomes a material
+///                of the model
+/// Errors name file and element: not_found, io, parse (malformed or inconsistent), unsupported
+/// (required extension, image), config (a material that the file does not have).
+[[nodiscard]] physics::Result<GltfModel> import_gltf(const std::filesystem::path& file,
+                                                     std::span<const MaterialImage> images = {});
 
 }  // namespace emit::scene

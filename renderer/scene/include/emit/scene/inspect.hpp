@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "emit/physics/error.hpp"
@@ -29,6 +30,8 @@ struct SceneSummary {
     /// Number of these triangles that are sheets with the library's material (see sheets.hpp): both
     /// faces have one temperature.
     std::uint64_t sheet_triangles = 0;
+    /// Main colours of the image of its base colour as "#rrggbb", with their share of the texels.
+    std::vector<std::pair<std::string, double>> colours;
   };
   std::filesystem::path file;
   std::uint32_t nodes = 0;

@@ -73,7 +73,13 @@ struct Instance {
 };
 
 /// Rule by which a glTF material found its entry in SceneGeometry::materials.
-enum class MappedBy : std::uint8_t { material_map, object_material, name, fallback };
+enum class MappedBy : std::uint8_t {
+  material_image,
+  material_map,
+  object_material,
+  name,
+  fallback
+};
 /// Material of one glTF material of one object.
 struct MaterialMapping {
   std::uint32_t object = 0;
@@ -119,13 +125,13 @@ void update_bounds(Mesh& mesh);
 /// Matrix of a pose.
 [[nodiscard]] glm::dmat4 world_from_body_matrix(const physics::Pose& pose) noexcept;
 
-/// Loads every glTF file of the scenario and resolves its materials. A glTF material is looked up
-/// in the object's material_map, then the object's `material`, then the library by name, then the
-/// scenario's default_material (with a warning that names it). Static surfaces of different objects
-/// that lie in one plane are cut, so that one of them wins everywhere. Setup only; any thread.
-/// Errors: io (a file cannot be read), config (a file that is missing or malformed, naming file and
-/// element; unknown library material, naming object and material; an entity without exactly one
-/// placement).
+/// Loads every glTF file of the scenario and resolves its materials. Images of materials part
+/// surfaces first. A glTF material is looked up in the object's material_map, then the object's
+/// `material`, then the library by name, then the scenario's default_material (with a warning that
+/// names it). Static surfaces of different objects that lie in one plane are cut, so that one of
+/// them wins everywhere. Setup only; any thread. Errors: io (a file cannot be read), config (a file
+/// that is missing or malformed, naming file and element; unknown library material, naming object
+/// and material; an entity without exactly one placement).
 [[nodiscard]] physics::Result<SceneGeometry> load_scene(const ScenarioDesc& scenario);
 
 }  // namespace emit::scene

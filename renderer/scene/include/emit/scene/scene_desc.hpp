@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <array>
+#include <compare>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -267,6 +268,23 @@ struct PartDesc {
   std::vector<TimedPartCommand> commands;  ///< ascending in time; off before the first
 };
 
+/// Colour of an image that stands for a material.
+struct MaterialColour {
+  std::array<std::uint8_t, 3> rgb{};  ///< red, green and blue of sRGB
+  std::string material;               ///< library material
+  auto operator<=>(const MaterialColour&) const = default;
+};
+/// Image that gives the surfaces of one glTF material several materials of the library, each texel
+/// the one whose colour in the legend is the nearest.
+struct MaterialImage {
+  std::string gltf_material;
+  std::filesystem::path image;         ///< PNG or JPEG; empty: the base colour of the file
+  std::vector<MaterialColour> legend;  ///< 1 to 64 different colours, ascending
+  /// Patches of fewer texels take the material around them.
+  std::uint32_t smallest_patch_px = 1;
+  auto operator<=>(const MaterialImage&) const = default;
+};
+
 /// A glTF file placed in the world, once or many times.
 struct ObjectDesc {
   std::string name;
@@ -276,6 +294,7 @@ struct ObjectDesc {
   /// looked up by their name, then the default material is used.
   std::string material;
   std::map<std::string, std::string> material_map;  ///< glTF material name -> library material
+  std::vector<MaterialImage> material_images;       ///< at most one for a glTF material
   std::vector<physics::Pose> instances;  ///< static placements; an entity has exactly one
   double scale = 1.0;
   /// Rotation of the model in its body: heading (nose to the right), pitch (nose up) and roll

@@ -30,15 +30,16 @@ class Field {
  public:
   explicit Field(const AlphaMask& mask) : mask_(mask) {}
 
-  [[nodiscard]] int columns() const { return mask_.width_px + 4; }
-  [[nodiscard]] int rows() const { return mask_.height_px + 4; }
+  [[nodiscard]] int columns() const { return mask_.frame.width_px + 4; }
+  [[nodiscard]] int rows() const { return mask_.frame.height_px + 4; }
 
   [[nodiscard]] double at(int column, int row) const {
     if (column == 0 || row == 0 || column == columns() - 1 || row == rows() - 1) return -1.0;
     const double x = column - 1.5;
     const double y = row - 1.5;
     // A column at the edge lies between the texels of both sides.
-    return alpha_at(mask_, clamped(x, mask_.width_px), clamped(y, mask_.height_px)) - mask_.cutoff;
+    return alpha_at(mask_, clamped(x, mask_.frame.width_px), clamped(y, mask_.frame.height_px)) -
+           mask_.cutoff;
   }
 
  private:
@@ -53,8 +54,8 @@ class Field {
 
 std::vector<std::vector<glm::dvec2>> alpha_rings(const AlphaMask& mask) {
   const Field field(mask);
-  const std::vector<double> xs = places(mask.width_px, mask.wrap_u);
-  const std::vector<double> ys = places(mask.height_px, mask.wrap_v);
+  const std::vector<double> xs = places(mask.frame.width_px, mask.frame.wrap_u);
+  const std::vector<double> ys = places(mask.frame.height_px, mask.frame.wrap_v);
   // Side s of a cell: 0 below row (its first row), 1 last column, 2 last row, 3 first column.
   const auto side_id = [&](int column, int row, int side) {
     const int c = column + (side == 1 ? 1 : 0);

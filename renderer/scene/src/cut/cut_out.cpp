@@ -1,20 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cut_out.hpp"
 
-#include <geos_c.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <glm/common.hpp>
-#include <numeric>
 #include <optional>
-#include <span>
 #include <tuple>
 #include <utility>
 
-#include "alpha_rings.hpp"
 #include "emit/physics/check.hpp"
+#include "geos.hpp"
+#include "outline_shapes.hpp"
 
 namespace emit::scene {
 namespace {
@@ -28,54 +25,6 @@ double cross(const glm::dvec2& a, const glm::dvec2& b) {
   return a.x * b.y - a.y * b.x;
 }
 
-/// A context of the geometry library, and what it makes.
-class Geos {
- public:
-  struct Free {
-    GEOSContextHandle_t context;
-    void operator()(GEOSGeometry* g) const { GEOSGeom_destroy_r(context, g); }
-  };
-  using Shape = std::unique_ptr<GEOSGeometry, Free>;
-
-  // The library is silent, because it gets no handlers for messages; every result is looked at.
-  Geos() : context_(GEOS_init_r()) {}
-  ~Geos() { GEOS_finish_r(context_); }
-  Geos(const Geos&) = delete;
-  Geos& operator=(const Geos&) = delete;
-
-  [[nodiscard]] GEOSContextHandle_t get() const { return context_; }
-  [[nodiscard]] Shape own(GEOSGeometry* shape) const { return Shape(shape, Free{context_}); }
-
-  [[nodiscard]] GEOSCoordSequence* sequence(std::span<const glm::dvec2> points) const {
-    GEOSCoordSequence* out =
-        GEOSCoordSeq_create_r(context_, static_cast<unsigned int>(points.size()), 2);
-    for (unsigned int i = 0; i < points.size(); ++i) {
-      GEOSCoordSeq_setXY_r(context_, out, i, points[i].x, points[i].y);
-    }
-    return out;
-  }
-  [[nodiscard]] double area(const GEOSGeometry* shape) const {
-    double area = 0.0;
-    return shape != nullptr && GEOSArea_r(context_, shape, &area) == 1 ? area : 0.0;
-  }
-
-  /// Calls for every polygon in a shape, which may be a collection of collections.
-  template <typename F>
-  void each_polygon(const GEOSGeometry* shape, const F& call) const {
-    const int kind = GEOSGeomTypeId_r(context_, shape);
-    if (kind == GEOS_POLYGON) {
-      if (GEOSisEmpty_r(context_, shape) == 0) call(shape);
-      return;
-    }
-    if (kind < GEOS_MULTIPOINT) return;
-    const int parts = GEOSGetNumGeometries_r(context_, shape);
-    for (int i = 0; i < parts; ++i) each_polygon(GEOSGetGeometryN_r(context_, shape, i), call);
-  }
-
- private:
-  GEOSContextHandle_t context_;
-};
-
 using Triangle = std::array<glm::dvec2, 3>;
 
 /// Shares of the corners of a triangle that make up a point in its plane.
@@ -85,7 +34,8 @@ glm::dvec3 shares_of(const Triangle& t, const glm::dvec2& p) {
   const double third = cross(t[1] - t[0], p - t[0]) / whole;
   glm::dvec3 shares(1.0 - second - third, second, third);
   // Points on an edge or corner of the triangle stay there exactly: neighbours have the same ones.
-  constexpr double kRounding = 1e-12;
+  // Coordinates of thousands of texels are rounded to a billionth of a texel.
+  constexpr double kRounding = 1e-9;
   for (int i = 0; i < 3; ++i) {
     if (std::abs(shares[i]) < kRounding) shares[i] = 0.0;
   }
@@ -104,22 +54,13 @@ std::pair<double, double> tiles_of(double low, double high) {
 /// Polygons of one image, with an index of their places.
 class CutOut::Outline {
  public:
-  Outline(const AlphaMask& mask, double tolerance_px) {
-    std::vector<GEOSGeometry*> lines;
-    for (const std::vector<glm::dvec2>& ring : alpha_rings(mask)) {
-      lines.push_back(GEOSGeom_createLineString_r(geos_.get(), geos_.sequence(ring)));
-    }
-    const Geos::Shape all = geos_.own(GEOSGeom_createCollection_r(
-        geos_.get(), GEOS_MULTILINESTRING, lines.data(), static_cast<unsigned int>(lines.size())));
-    const Geos::Shape area = geos_.own(GEOSBuildArea_r(geos_.get(), all.get()));
-    shape_ = area ? geos_.own(GEOSTopologyPreserveSimplify_r(geos_.get(), area.get(), tolerance_px))
-                  : geos_.own(nullptr);
+  template <typename Image>
+  Outline(const Image& image, double tolerance_px)
+      : shapes_(outline_shapes(geos_, image, tolerance_px)) {
     tree_ = GEOSSTRtree_create_r(geos_.get(), 10);
-    if (!shape_) return;
-    geos_.each_polygon(shape_.get(), [&](const GEOSGeometry* polygon) {
-      if (geos_.area(polygon) < tolerance_px * tolerance_px) return;
-      polygons_.push_back({polygon, GEOSPrepare_r(geos_.get(), polygon)});
-    });
+    for (const OutlineShapes::Part& part : shapes_.parts) {
+      polygons_.push_back({part.polygon, GEOSPrepare_r(geos_.get(), part.polygon), part.part});
+    }
     for (Polygon& polygon : polygons_) {
       GEOSSTRtree_insert_r(geos_.get(), tree_, polygon.shape, &polygon);
     }
@@ -133,12 +74,17 @@ class CutOut::Outline {
   Outline& operator=(const Outline&) = delete;
 
   /// False: the outline could not be made.
-  [[nodiscard]] bool valid() const { return shape_ != nullptr; }
+  [[nodiscard]] bool valid() const { return shapes_.owner != nullptr; }
 
+  /// A piece of a triangle.
+  struct Piece {
+    Triangle corners;
+    std::uint8_t part = 0;
+  };
   enum class Kept { nothing, whole, part, failed };
 
-  /// Appends what is kept of a triangle, three corners for each piece.
-  Kept cut(const Triangle& triangle, std::vector<glm::dvec2>& corners) {
+  /// Appends what is kept of a triangle. Where all of it is of one part, there is one piece.
+  Kept cut(const Triangle& triangle, std::vector<Piece>& pieces) {
     const std::array<glm::dvec2, 4> ring{triangle[0], triangle[1], triangle[2], triangle[0]};
     const Geos::Shape area = geos_.own(GEOSGeom_createPolygon_r(
         geos_.get(), GEOSGeom_createLinearRing_r(geos_.get(), geos_.sequence(ring)), nullptr, 0));
@@ -150,12 +96,13 @@ class CutOut::Outline {
           static_cast<std::vector<Polygon*>*>(list)->push_back(static_cast<Polygon*>(item));
         },
         &found_);
-    const std::size_t before = corners.size();
+    const std::size_t before = pieces.size();
     const glm::dvec2 low = glm::min(glm::min(triangle[0], triangle[1]), triangle[2]);
     const glm::dvec2 high = glm::max(glm::max(triangle[0], triangle[1]), triangle[2]);
     for (const Polygon* polygon : found_) {
       if (GEOSPreparedIntersects_r(geos_.get(), polygon->prepared, area.get()) == 0) continue;
       if (GEOSPreparedContains_r(geos_.get(), polygon->prepared, area.get()) == 1) {
+        pieces.push_back({triangle, polygon->part});
         return Kept::whole;
       }
       // A large polygon is cut to the triangle's box first, which costs far less than an overlay.
@@ -164,22 +111,23 @@ class CutOut::Outline {
       const bool sound = near && GEOSisValid_r(geos_.get(), near.get()) == 1;
       const Geos::Shape piece = geos_.own(
           GEOSIntersection_r(geos_.get(), sound ? near.get() : polygon->shape, area.get()));
-      if (!piece || !add_pieces(piece.get(), corners)) {
-        corners.resize(before);
+      if (!piece || !add_pieces(piece.get(), polygon->part, pieces)) {
+        pieces.resize(before);
         return Kept::failed;
       }
     }
-    return corners.size() > before ? Kept::part : Kept::nothing;
+    return pieces.size() > before ? Kept::part : Kept::nothing;
   }
 
  private:
   struct Polygon {
     const GEOSGeometry* shape;
     const GEOSPreparedGeometry* prepared;
+    std::uint8_t part;
   };
 
   /// Appends the triangles of every polygon of a shape; false: there is no triangulation.
-  bool add_pieces(const GEOSGeometry* shape, std::vector<glm::dvec2>& corners) {
+  bool add_pieces(const GEOSGeometry* shape, std::uint8_t part, std::vector<Piece>& pieces) {
     bool sound = true;
     geos_.each_polygon(shape, [&](const GEOSGeometry* polygon) {
       const Geos::Shape triangles =
@@ -191,54 +139,112 @@ class CutOut::Outline {
         return;
       }
       geos_.each_polygon(triangles.get(), [&](const GEOSGeometry* triangle) {
-        const GEOSCoordSequence* points =
-            GEOSGeom_getCoordSeq_r(geos_.get(), GEOSGetExteriorRing_r(geos_.get(), triangle));
-        for (unsigned int i = 0; i < 3; ++i) {
-          glm::dvec2 point(0.0);
-          GEOSCoordSeq_getXY_r(geos_.get(), points, i, &point.x, &point.y);
-          corners.push_back(point);
-        }
+        const std::vector<glm::dvec2> ring =
+            geos_.points_of(GEOSGetExteriorRing_r(geos_.get(), triangle));
+        sound = sound && ring.size() == 4;
+        if (sound) pieces.push_back({{ring[0], ring[1], ring[2]}, part});
       });
     });
     return sound;
   }
 
   Geos geos_;
-  Geos::Shape shape_{nullptr, Geos::Free{nullptr}};
+  OutlineShapes shapes_;
   std::vector<Polygon> polygons_;
   std::vector<Polygon*> found_;
   GEOSSTRtree* tree_ = nullptr;
 };
 
-CutOut::CutOut(AlphaMask mask) : mask_(std::move(mask)) {}
+CutOut::CutOut(AlphaMask mask) : image_(std::move(mask)) {}
+CutOut::CutOut(RegionImage image) : image_(std::move(image)) {}
 CutOut::~CutOut() = default;
 CutOut::CutOut(CutOut&&) noexcept = default;
 CutOut& CutOut::operator=(CutOut&&) noexcept = default;
+
+const ImageFrame& CutOut::frame() const {
+  return std::visit([](const auto& image) -> const ImageFrame& { return image.frame; }, image_);
+}
+
+std::span<const double> CutOut::tolerances_px() const {
+  static constexpr double kOfMasks[] = {0.2, 0.5, 1.0, 2.0, 4.0, 8.0};
+  static constexpr double kOfRegions[] = {0.75, 1.5, 3.0, 6.0, 12.0};
+  if (mask() != nullptr) return kOfMasks;
+  return kOfRegions;
+}
+
+std::optional<std::uint8_t> CutOut::part_at(double x_px, double y_px) const {
+  if (const AlphaMask* mask = this->mask()) {
+    if (alpha_at(*mask, x_px, y_px) >= mask->cutoff) return 0;
+    return std::nullopt;
+  }
+  const RegionImage& image = std::get<RegionImage>(image_);
+  const TexelPlace place = texel_at(image.frame, x_px, y_px);
+  return image.at(place.x, place.y);
+}
+
+std::optional<std::optional<std::uint8_t>> CutOut::sole_part() const {
+  using Sole = std::optional<std::optional<std::uint8_t>>;
+  if (const AlphaMask* mask = this->mask()) {
+    const auto [least, most] = std::ranges::minmax(mask->alpha);
+    if (most < mask->cutoff) return Sole(std::in_place, std::nullopt);
+    if (least >= mask->cutoff) return Sole(std::in_place, std::uint8_t{0});
+    return std::nullopt;
+  }
+  const RegionImage& image = std::get<RegionImage>(image_);
+  const auto [least, most] = std::ranges::minmax(image.region);
+  if (least != most) return std::nullopt;
+  return Sole(std::in_place, least);
+}
+
+double CutOut::unlike_frac(std::span<const glm::dvec2, 3> triangle) const {
+  const auto* image = std::get_if<RegionImage>(&image_);
+  if (image == nullptr) return 0.0;
+  // Places spread evenly over the triangle: a sequence of low discrepancy, folded at its diagonal.
+  constexpr int kPlaces = 32;
+  int unlike = 0;
+  for (int i = 1; i <= kPlaces; ++i) {
+    double a = std::fmod(0.7548776662466927 * i, 1.0);
+    double b = std::fmod(0.5698402909980532 * i, 1.0);
+    if (a + b > 1.0) {
+      a = 1.0 - a;
+      b = 1.0 - b;
+    }
+    const glm::dvec2 p =
+        triangle[0] + a * (triangle[1] - triangle[0]) + b * (triangle[2] - triangle[0]);
+    const TexelPlace place = texel_at(image->frame, p.x, p.y);
+    unlike += image->unlike[image->index(place.x, place.y)];
+  }
+  return static_cast<double>(unlike) / kPlaces;
+}
 
 std::optional<CutTriangles> CutOut::cut(const std::vector<glm::dvec2>& uv,
                                         const std::vector<std::uint32_t>& indices,
                                         double tolerance_px) {
   EMIT_CHECK_OP(tolerance_px, >, 0.0);
-  if (!outline_ || tolerance_px_ != tolerance_px) {
-    outline_ = std::make_unique<Outline>(mask_, tolerance_px);
+  CutTriangles out;
+  const auto sole = sole_part();
+  if (sole && !*sole) return out;
+  if (!sole && (!outline_ || tolerance_px_ != tolerance_px)) {
+    outline_ = std::visit(
+        [&](const auto& image) { return std::make_unique<Outline>(image, tolerance_px); }, image_);
     tolerance_px_ = tolerance_px;
   }
-  const glm::dvec2 size(mask_.width_px, mask_.height_px);
-  CutTriangles out;
-  const auto [least, most] = std::ranges::minmax(mask_.alpha);
-  if (most < mask_.cutoff) return out;
-  if (least >= mask_.cutoff) {
-    out.whole.resize(indices.size() / 3);
-    std::iota(out.whole.begin(), out.whole.end(), 0U);
-    return out;
-  }
+  const bool keeps_all = mask() == nullptr;
+  const ImageFrame& frame = this->frame();
+  const glm::dvec2 size(frame.width_px, frame.height_px);
   double tiles = 0.0;
-  std::vector<glm::dvec2> corners;
+  double covered_px2 = 0.0;
+  double unlike_px2 = 0.0;
+  std::vector<Outline::Piece> pieces;
   for (std::size_t i = 0; i + 2 < indices.size(); i += 3) {
     const auto index = static_cast<std::uint32_t>(i / 3);
+    if (sole && mask() != nullptr) {
+      out.whole.push_back({index, **sole});
+      continue;
+    }
     Triangle triangle;
     for (std::size_t c = 0; c < 3; ++c) {
-      triangle[c] = glm::dvec2(mask_.image_from_uv * glm::dvec3(uv[indices[i + c]], 1.0)) * size;
+      triangle[c] = glm::dvec2(frame.image_from_uv * glm::dvec3(uv[indices[i + c]], 1.0)) * size;
     }
     const glm::dvec2 low = glm::min(glm::min(triangle[0], triangle[1]), triangle[2]);
     const glm::dvec2 high = glm::max(glm::max(triangle[0], triangle[1]), triangle[2]);
@@ -246,45 +252,56 @@ std::optional<CutTriangles> CutOut::cut(const std::vector<glm::dvec2>& uv,
     // Coordinates beyond this have no place in the image any more.
     constexpr double kFarthestPx = 1e12;
     if (!(std::max({-low.x, -low.y, high.x, high.y}) < kFarthestPx)) {
-      out.whole.push_back(index);
+      out.whole.push_back({index, 0});
       ++out.uncut;
       continue;
     }
+    const glm::dvec2 middle = (triangle[0] + triangle[1] + triangle[2]) / 3.0;
     const double area = std::abs(cross(triangle[1] - triangle[0], triangle[2] - triangle[0]));
     if (!(area > kFlatFrac * extent * extent)) {
       // All of it has one place in the image.
-      const glm::dvec2 middle = (triangle[0] + triangle[1] + triangle[2]) / 3.0;
-      if (alpha_at(mask_, middle.x, middle.y) >= mask_.cutoff) out.whole.push_back(index);
+      if (const auto part = part_at(middle.x, middle.y)) out.whole.push_back({index, *part});
       continue;
     }
-    if (!outline_->valid()) {
-      out.whole.push_back(index);
+    covered_px2 += area;
+    unlike_px2 += area * unlike_frac(triangle);
+    if (sole) {
+      out.whole.push_back({index, **sole});
+      continue;
+    }
+    // A triangle that cannot be cut is solid, or of the part in its middle.
+    const auto give_up = [&] {
+      out.whole.push_back({index, keeps_all ? *part_at(middle.x, middle.y) : std::uint8_t{0}});
       ++out.uncut;
+    };
+    if (!outline_->valid()) {
+      give_up();
       continue;
     }
     glm::dvec2 first(0.0);
     glm::dvec2 last(0.0);
-    if (mask_.wrap_u != Wrap::clamp) {
+    if (frame.wrap_u != Wrap::clamp) {
       std::tie(first.x, last.x) = tiles_of(low.x / size.x, high.x / size.x);
     }
-    if (mask_.wrap_v != Wrap::clamp) {
+    if (frame.wrap_v != Wrap::clamp) {
       std::tie(first.y, last.y) = tiles_of(low.y / size.y, high.y / size.y);
     }
     tiles += (last.x - first.x + 1.0) * (last.y - first.y + 1.0);
     if (!(tiles <= kMaxTiles)) return std::nullopt;
     const bool one_tile = first == last;
     // Coordinates that rounding carried over the edge of the image go back onto it.
-    const glm::dvec2 lowest(mask_.wrap_u == Wrap::clamp ? low.x : 0.0,
-                            mask_.wrap_v == Wrap::clamp ? low.y : 0.0);
-    const glm::dvec2 highest(mask_.wrap_u == Wrap::clamp ? high.x : size.x,
-                             mask_.wrap_v == Wrap::clamp ? high.y : size.y);
+    const glm::dvec2 lowest(frame.wrap_u == Wrap::clamp ? low.x : 0.0,
+                            frame.wrap_v == Wrap::clamp ? low.y : 0.0);
+    const glm::dvec2 highest(frame.wrap_u == Wrap::clamp ? high.x : size.x,
+                             frame.wrap_v == Wrap::clamp ? high.y : size.y);
     const std::size_t begin = out.corners.size();
+    double pieces_px2 = 0.0;
     bool failed = false;
-    bool whole = false;
+    std::optional<std::uint8_t> whole;
     for (double row = first.y; row <= last.y && !failed; ++row) {
       for (double column = first.x; column <= last.x && !failed; ++column) {
-        const bool turn_u = mask_.wrap_u == Wrap::mirror && std::fmod(column, 2.0) != 0.0;
-        const bool turn_v = mask_.wrap_v == Wrap::mirror && std::fmod(row, 2.0) != 0.0;
+        const bool turn_u = frame.wrap_u == Wrap::mirror && std::fmod(column, 2.0) != 0.0;
+        const bool turn_v = frame.wrap_v == Wrap::mirror && std::fmod(row, 2.0) != 0.0;
         // The triangle moves into the one image that the outline is known for.
         Triangle moved = triangle;
         for (glm::dvec2& corner : moved) {
@@ -293,26 +310,37 @@ std::optional<CutTriangles> CutOut::cut(const std::vector<glm::dvec2>& uv,
           if (turn_u) corner.x = size.x - corner.x;
           if (turn_v) corner.y = size.y - corner.y;
         }
-        corners.clear();
-        const Outline::Kept kept = outline_->cut(moved, corners);
+        pieces.clear();
+        const Outline::Kept kept = outline_->cut(moved, pieces);
         failed = kept == Outline::Kept::failed;
-        whole = one_tile && kept == Outline::Kept::whole;
+        if (kept == Outline::Kept::whole && one_tile) {
+          whole = pieces.back().part;
+          break;
+        }
         const bool is_positive = cross(moved[1] - moved[0], moved[2] - moved[0]) > 0.0;
-        for (std::size_t k = 0; k + 2 < corners.size(); k += 3) {
-          const bool turned = (cross(corners[k + 1] - corners[k], corners[k + 2] - corners[k]) >
-                               0.0) != is_positive;
-          for (const std::size_t corner : {k, turned ? k + 2 : k + 1, turned ? k + 1 : k + 2}) {
-            out.corners.push_back({index, shares_of(moved, corners[corner])});
+        for (const Outline::Piece& piece : pieces) {
+          const double turned =
+              cross(piece.corners[1] - piece.corners[0], piece.corners[2] - piece.corners[0]);
+          pieces_px2 += std::abs(turned);
+          const bool turns = (turned > 0.0) != is_positive;
+          for (const std::size_t corner : {0U, turns ? 2U : 1U, turns ? 1U : 2U}) {
+            out.corners.push_back({index, piece.part, shares_of(moved, piece.corners[corner])});
           }
         }
       }
     }
-    if (failed) {
+    // Regions leave nothing out: the sum of the pieces proves it, but for what tiles_of() rounds.
+    constexpr double kMissingFrac = 1e-6;
+    const double rounded_px2 = 4.0 * kMissingFrac * extent * std::max(size.x, size.y);
+    if (whole) {
+      out.whole.push_back({index, *whole});
+    } else if (failed ||
+               (keeps_all && std::abs(pieces_px2 - area) > kMissingFrac * area + rounded_px2)) {
       out.corners.resize(begin);
-      ++out.uncut;
+      give_up();
     }
-    if (failed || whole) out.whole.push_back(index);
   }
+  out.unlike_frac = covered_px2 > 0.0 ? unlike_px2 / covered_px2 : 0.0;
   return out;
 }
 
