@@ -450,6 +450,10 @@ FosterState<double> FosterHistory::hidden_states(std::size_t material,
   return out;
 }
 
+double FosterHistory::day_sun_j_m2(const glm::dvec3& normal) const noexcept {
+  return static_cast<double>(scene::kBalancedDayNs) * 1e-9 * mean_sun_w_m2(day_, normal);
+}
+
 IntervalForcing FosterHistory::extend(std::int64_t begin_ns, std::int64_t end_ns,
                                       const Environment& environment) noexcept {
   IntervalForcing out;

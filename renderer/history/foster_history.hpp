@@ -114,6 +114,10 @@ class FosterHistory {
   [[nodiscard]] physics::FosterState<double> hidden_states(std::size_t material,
                                                            const FaceOpening& face) const noexcept;
 
+  /// Returns the sun on an unshadowed face over the day in whose balance surfaces begin, J m-2. It
+  /// is 0 where none does. Thread: any. RT-safe.
+  [[nodiscard]] double day_sun_j_m2(const glm::dvec3& normal) const noexcept;
+
   /// Advances the surroundings over an interval that follows the last one and returns its forcing.
   /// RT-safe.
   [[nodiscard]] IntervalForcing extend(std::int64_t begin_ns, std::int64_t end_ns,

@@ -68,6 +68,11 @@ class SurfaceHistory {
                                                            const FaceOpening& face) const noexcept {
     return foster_ ? foster_->hidden_states(material, face) : physics::FosterState<double>{};
   }
+  /// Returns the sun on an unshadowed face over the day in whose balance surfaces begin, J m-2. It
+  /// is 0 where none does.
+  [[nodiscard]] double day_sun_j_m2(const glm::dvec3& normal) const noexcept {
+    return foster_ ? foster_->day_sun_j_m2(normal) : 0.0;
+  }
 
  private:
   std::optional<FosterHistory> foster_;

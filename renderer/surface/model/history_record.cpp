@@ -36,10 +36,10 @@ void append(HistoryRecord& record, const HistoryInterval& interval, const Interv
 }  // namespace
 
 double sun_share(const HistoryRecord& record, const SurfaceSample& sample,
-                 std::span<const float> sun_frac) noexcept {
+                 std::span<const float> sun_frac, double day_j_m2) noexcept {
   EMIT_DCHECK_OP(sun_frac.size(), ==, record.size());
   double all_j_m2 = 0.0;
-  double reached_j_m2 = 0.0;
+  double hidden_j_m2 = 0.0;
   for (std::size_t i = 0; i < record.size(); ++i) {
     if (!record.rays[i].sun_up()) continue;
     const IntervalForcing& forcing = record.intervals[i].forcing;
@@ -48,9 +48,10 @@ double sun_share(const HistoryRecord& record, const SurfaceSample& sample,
                             (std::max(0.0, glm::dot(normal, forcing.begin.sun_w_m2)) +
                              std::max(0.0, glm::dot(normal, forcing.end.sun_w_m2)));
     all_j_m2 += sun_j_m2;
-    reached_j_m2 += sun_j_m2 * static_cast<double>(sun_frac[i]);
+    hidden_j_m2 += sun_j_m2 * (1.0 - static_cast<double>(sun_frac[i]));
   }
-  return all_j_m2 > 0.0 ? reached_j_m2 / all_j_m2 : 1.0;
+  const double known_j_m2 = std::max(all_j_m2, day_j_m2);
+  return known_j_m2 > 0.0 ? 1.0 - hidden_j_m2 / known_j_m2 : 1.0;
 }
 
 HistoryRecord make_history_record(const StepPlan& plan, const SurfaceHistory& history,

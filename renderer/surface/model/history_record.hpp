@@ -22,10 +22,12 @@ struct HistoryRecord {
   [[nodiscard]] std::size_t size() const noexcept { return intervals.size(); }
 };
 
-/// Returns the share of the sun that reaches a sample over the record, by the energy on its face.
-/// `sun_frac` has the share of each interval. It is 1 where no sun shines on the face. RT-safe.
+/// Returns the share of the sun that reaches a sample, by the energy on its face. `sun_frac` has
+/// the share of each interval of the record. `day_j_m2` is what an unshadowed face gets in a whole
+/// day: where the record is shorter than a day, nothing is known of the rest of it, and that counts
+/// as unshadowed. The share is 1 where no sun shines on the face. RT-safe.
 [[nodiscard]] double sun_share(const HistoryRecord& record, const SurfaceSample& sample,
-                               std::span<const float> sun_frac) noexcept;
+                               std::span<const float> sun_frac, double day_j_m2) noexcept;
 
 /// Inputs of make_history_record(). All of them must outlive the call.
 struct RecordInputs {

@@ -30,7 +30,7 @@ namespace emit::renderer {
 
 /// Version of the format. It rises with every change of the layout, and with every change of the
 /// program that gives another state for the same inputs.
-inline constexpr std::uint32_t kStateVersion = 29;
+inline constexpr std::uint32_t kStateVersion = 30;
 
 /// Parts of the input on which a state depends. The error about a file that does not fit names the
 /// parts that differ.

@@ -38,7 +38,8 @@ void start_twins(const SurfaceInputs& inputs, const SurfaceSamples& all,
       histories.start[s] = known;
       if (inputs.history.starts_balanced(twin.material)) {
         inputs.heat.hide_start(twin, normal, inputs.history,
-                               sun_share(inputs.record, twin, histories.rows[s].sun_frac),
+                               sun_share(inputs.record, twin, histories.rows[s].sun_frac,
+                                         inputs.history.day_sun_j_m2(glm::dvec3(normal))),
                                histories.start[s]);
       }
       // Under a solid it has no heat of its own; see FosterHeat::begin_column().

@@ -104,7 +104,9 @@ SampleState PatchSampler::start_state(const SurfaceSample& sample, std::span<con
   }
   SampleState state = memo.state;
   if (!in_.history.starts_balanced(sample.material)) return state;
-  in_.heat.hide_start(sample, normal, in_.history, sun_share(in_.record, sample, sun_frac), state);
+  in_.heat.hide_start(
+      sample, normal, in_.history,
+      sun_share(in_.record, sample, sun_frac, in_.history.day_sun_j_m2(glm::dvec3(normal))), state);
   return state;
 }
 

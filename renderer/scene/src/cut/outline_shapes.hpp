@@ -19,10 +19,10 @@ struct OutlineShapes {
   std::vector<Part> parts;
 };
 
-/// What a mask keeps, as part 0, with outlines that are off by at most `tolerance_px`.
+/// Returns what a mask keeps, as part 0, with outlines that are off by at most `tolerance_px`.
 [[nodiscard]] OutlineShapes outline_shapes(const Geos& geos, const AlphaMask& mask,
                                            double tolerance_px);
-/// The regions of an image, without gaps and without overlap.
+/// Returns the regions of an image, without gaps and without overlap.
 [[nodiscard]] OutlineShapes outline_shapes(const Geos& geos, const RegionImage& image,
                                            double tolerance_px);
 

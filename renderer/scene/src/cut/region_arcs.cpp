@@ -165,7 +165,7 @@ class Walk {
       const bool at_end = degree(x, y) != 2 || (x == first_x && y == first_y);
       int next = direction;
       if (!at_end) {
-        // Of the two sides that meet here, the line came along one and leaves along the other.
+        // Two sides meet here: the line came along one and leaves along the other.
         for (const int turn : {direction, (direction + 1) % 4, (direction + 3) % 4}) {
           if (sides_.parts(x, y, turn)) {
             next = turn;

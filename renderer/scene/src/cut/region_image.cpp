@@ -48,7 +48,7 @@ Nearest nearest(const glm::dvec3& lab, std::span<const glm::dvec3> legend, std::
   return out;
 }
 
-/// What a colour of the image is, found once for all its texels.
+/// A colour of the image is looked up once for all its texels.
 struct KnownColour {
   glm::dvec3 lab{0.0};
   Nearest nearest;
