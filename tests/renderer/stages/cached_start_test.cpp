@@ -95,7 +95,8 @@ TEST(RendererStart, ThickGroundHasKnownItsShadeForWeeks) {
 }
 
 TEST(RendererStart, AnAfternoonInTheShadeIsNotAWholeDayInIt) {
-  // The stated history has four hours of the afternoon, and nothing is known of the rest of the day.
+  // The stated history has four hours of the afternoon, and nothing is known of the rest of the
+  // day.
   scene::ScenarioDesc s = wall_on_thick_ground();
   scene::ScenarioDesc weeks = s;
   weeks.thermal.spin_up_ns = 0;
