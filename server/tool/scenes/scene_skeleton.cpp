@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <string_view>
 
 #include "tool/scenes/scenario_file.hpp"
 
@@ -83,6 +84,19 @@ std::string skeleton_text(const scene::SceneSummary& model,
           fmt::format("{} = {}   # {}; guessed by '{}': REVIEW\n", toml_quoted(each.gltf_material),
                       toml_quoted(each.guess.material), share, each.guess.word);
     }
+  }
+  for (const scene::SceneSummary::MaterialRow& row : model.materials) {
+    if (row.triangles == 0 || row.gltf_material.empty() || row.colours.size() < 2) continue;
+    out += fmt::format(
+        "\n# The image of {} shows several colours. These lines make materials of them:\n"
+        "# [[object.material_images]]\n# material = {}\n# legend = {{",
+        toml_quoted(row.gltf_material), toml_quoted(row.gltf_material));
+    std::string_view comma;
+    for (const auto& [colour, frac] : row.colours) {
+      out += fmt::format("{} {} = \"?\"", comma, toml_quoted(colour));
+      comma = ",";
+    }
+    out += " }\n";
   }
   // The camera stands in front, to the left, a little above.
   constexpr double kFovDeg = 30.0;

@@ -105,6 +105,34 @@ TEST(CliScene, a_model_becomes_a_scenario_that_is_sound_and_shows_itself) {
       run_emit({"scene", "new", folder.file("car.gltf"), "--out", folder.file("s")}).exit_code, 1);
 }
 
+TEST(CliScene, colours_of_an_image_are_offered_as_materials) {
+  const TemporaryFolder folder;
+  write_box(folder.file("car.gltf"), {});
+  std::string model = read_text(folder.file("car.gltf"));
+  const std::string name = R"("name":"Car_Paint")";
+  model.replace(model.find(name), name.size(),
+                name + R"(,"pbrMetallicRoughness":{"baseColorTexture":{"index":0}})");
+  const std::string scene = R"("scene":0,)";
+  // Three texels of #4a5d23 and one of #1c1c1c.
+  model.insert(model.find(scene),
+               R"("textures":[{"source":0}],"images":[{"uri":"data:image/png;base64,)"
+               "iVBORw0KGgoAAAANSUhEUgAAAAQAAAABCAIAAAB2XpiaAAAAFUlEQVR4nGP0"
+               "ilVmYGBgYGC4tP8nAA3cA1ZDPqpEAAAAAElFTkSuQmCC"
+               R"("}],)");
+  write_text(folder.file("car.gltf"), model);
+  const ProcessResult inspected = run_emit({"inspect", folder.file("car.gltf")});
+  EXPECT_NE(inspected.out.find("image: #4a5d23 75.0 % #1c1c1c 25.0 %"), std::string::npos)
+      << inspected.out << inspected.err;
+  ASSERT_EQ(
+      run_emit({"scene", "new", folder.file("car.gltf"), "--out", folder.file("s")}).exit_code, 0);
+  const std::string text = read_text(folder.file("s/car.toml"));
+  EXPECT_NE(text.find("# [[object.material_images]]\n# material = \"Car_Paint\"\n"
+                      "# legend = { \"#4a5d23\" = \"?\", \"#1c1c1c\" = \"?\" }"),
+            std::string::npos)
+      << text;
+  EXPECT_EQ(run_emit({"scene", "check", folder.file("s/car.toml")}).exit_code, 0);
+}
+
 TEST(CliScene, centimetres_are_scaled_and_named) {
   const TemporaryFolder folder;
   write_box(folder.file("car.gltf"), {.left = 200.0F, .up = 150.0F, .forward = 400.0F});
