@@ -130,7 +130,10 @@ TEST(CliScene, colours_of_an_image_are_offered_as_materials) {
                       "# legend = { \"#4a5d23\" = \"?\", \"#1c1c1c\" = \"?\" }"),
             std::string::npos)
       << text;
-  EXPECT_EQ(run_emit({"scene", "check", folder.file("s/car.toml")}).exit_code, 0);
+  const ProcessResult check = run_emit({"scene", "check", folder.file("s/car.toml")});
+  EXPECT_EQ(check.exit_code, 1);
+  EXPECT_NE(check.out.find("'material_images' makes materials of their colours"), std::string::npos)
+      << check.out << check.err;
 }
 
 TEST(CliScene, centimetres_are_scaled_and_named) {
