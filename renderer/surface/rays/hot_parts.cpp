@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <limits>
 #include <map>
 #include <utility>
 
@@ -54,6 +56,33 @@ float visible_frac(const CasterRays& rays, const CasterSelection& selection,
     if (!hidden) ++visible;
   }
   return static_cast<float>(visible) / static_cast<float>(places_m.size());
+}
+
+/// Returns the point of a triangle that is nearest to another point.
+glm::vec3 nearest_of(const std::array<glm::vec3, 3>& corners_m, const glm::vec3& point_m) noexcept {
+  const glm::vec3 across = glm::cross(corners_m[1] - corners_m[0], corners_m[2] - corners_m[0]);
+  glm::vec3 found_m = corners_m[0];
+  float least_m = std::numeric_limits<float>::infinity();
+  bool inside = glm::dot(across, across) > 0.0F;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const glm::vec3& from_m = corners_m[c];
+    const glm::vec3 edge_m = corners_m[(c + 1) % 3] - from_m;
+    const glm::vec3 to_m = point_m - from_m;
+    inside = inside && glm::dot(glm::cross(edge_m, to_m), across) >= 0.0F;
+    const float squared = glm::dot(edge_m, edge_m);
+    const float share =
+        squared > 0.0F ? glm::clamp(glm::dot(to_m, edge_m) / squared, 0.0F, 1.0F) : 0.0F;
+    const glm::vec3 place_m = from_m + share * edge_m;
+    const float away_m = glm::distance(place_m, point_m);
+    if (away_m < least_m) {
+      least_m = away_m;
+      found_m = place_m;
+    }
+  }
+  if (!inside) return found_m;
+  // The foot of the point lies within the triangle.
+  const glm::vec3 unit = glm::normalize(across);
+  return point_m - glm::dot(point_m - corners_m[0], unit) * unit;
 }
 
 }  // namespace
@@ -127,6 +156,29 @@ float HotParts::on_w_m2(const CasterRays& rays, const IntervalRays& interval,
                     : near_w_m2(part, place, rays, selection, start_m, normal);
   }
   return sum_w_m2;
+}
+
+float HotParts::missed_w_m2(const IntervalRays& interval, const std::array<glm::vec3, 3>& corners_m,
+                            const glm::vec3& normal, float wide_frac) const noexcept {
+  const float longest_m = std::max({glm::distance(corners_m[0], corners_m[1]),
+                                    glm::distance(corners_m[1], corners_m[2]),
+                                    glm::distance(corners_m[2], corners_m[0])});
+  float most_w_m2 = 0.0F;
+  for (const Part& part : parts_) {
+    if (!interval.stands(part.entity)) continue;
+    const EntityPlacement& place = interval.middle_placements()[part.entity];
+    const glm::vec3 centre_m = place.rel_from_body * part.centre_m + place.position_m;
+    const glm::vec3 way = centre_m - nearest_of(corners_m, centre_m);
+    const float ahead_m = glm::dot(way, normal);
+    if (ahead_m + part.radius_m <= 0.0F) continue;
+    const float away_m = std::max(glm::length(way), part.radius_m);
+    if (longest_m <= wide_frac * away_m) continue;
+    // A body that sends to all sides shows a quarter of its area in the mean.
+    const float cosine = std::min(1.0F, (ahead_m + part.radius_m) / away_m);
+    const float frac = std::min(1.0F, 0.25F * part.area_m2 * cosine / (kPiF * away_m * away_m));
+    most_w_m2 = std::max(most_w_m2, std::abs(part.sent_w_m2) * frac);
+  }
+  return most_w_m2;
 }
 
 float HotParts::far_w_m2(const Part& part, const EntityPlacement& place, const CasterRays& rays,

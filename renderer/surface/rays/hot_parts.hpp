@@ -35,6 +35,12 @@ class HotParts {
   /// they are seen. `start_m` lies before the face, and `normal` is its unit normal (rel). RT-safe.
   [[nodiscard]] float on_w_m2(const CasterRays& rays, const IntervalRays& interval,
                               const glm::vec3& start_m, const glm::vec3& normal) const noexcept;
+  /// Returns the most that a part can send to a place of a triangle that is wider than `wide_frac`
+  /// of the way to the part, W/m2: what corners so far apart cannot know. Nothing hides a part
+  /// here. `corners_m` and `normal` are those of the triangle (rel). RT-safe.
+  [[nodiscard]] float missed_w_m2(const IntervalRays& interval,
+                                  const std::array<glm::vec3, 3>& corners_m,
+                                  const glm::vec3& normal, float wide_frac) const noexcept;
   /// Returns whether no entity with such a part has moved, come or gone between two intervals.
   [[nodiscard]] bool same(const IntervalRays& before, const IntervalRays& now) const noexcept;
 

@@ -63,6 +63,10 @@ constexpr double kCreaseThicknesses = 1.0;
 constexpr float kCreaseTolerances = 3.0F;
 /// Shortest edges that are halved for it, in pixels.
 constexpr float kMinCreasePx = 2.0F;
+/// Triangles wider than this share of the way to a hot part may miss what it sends, and losses by
+/// which that becomes a temperature: those of a face in calm air.
+constexpr float kWideFrac = 0.5F;
+constexpr float kHotLossesW_m2_k = 12.0F;
 /// Allowed error from facing elsewhere, in tolerances, for large triangles and for those of a few
 /// pixels.
 constexpr float kBendFrac = 1.0F;
@@ -196,8 +200,12 @@ SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs,
     coming_.emplace_back(std::vector<float>());
     coming_.back().hold(to_sun);
   }
-  // Find the first interval in which edges of shadows are still sharp.
   const HistoryRecord& record = inputs.record;
+  if (options.exchange) hot_ = HotParts(inputs.geometry, inputs.entity_of_object);
+  for (std::size_t i = 0; i < record.size() && !hot_.empty(); ++i) {
+    if (i == 0 || !hot_.same(record.rays[i - 1], record.rays[i])) hot_since_.push_back(i);
+  }
+  // Find the first interval in which edges of shadows are still sharp.
   recent_ = record.size() - 1;
   while (recent_ > 0 && record.lag_s[recent_ - 1] < kRecentS) --recent_;
 }
@@ -285,6 +293,16 @@ float SurfaceRefinement::shadow_edge_k(const RefinedMesh& refined, std::uint32_t
     if (high - low > kEdgeSunFrac) return range_k;
   }
   return 0.0F;
+}
+
+float SurfaceRefinement::missed_heat_k(const std::array<glm::vec3, 3>& corners_m,
+                                       const glm::vec3& normal) const {
+  float most_w_m2 = 0.0F;
+  for (const std::size_t i : hot_since_) {
+    most_w_m2 =
+        std::max(most_w_m2, hot_.missed_w_m2(in_.record.rays[i], corners_m, normal, kWideFrac));
+  }
+  return most_w_m2 / kHotLossesW_m2_k;
 }
 
 float SurfaceRefinement::missed_shade_k(const RefinedMesh& refined, std::uint32_t slot,
@@ -400,6 +418,10 @@ SurfaceRefinement::Judged SurfaceRefinement::need(const RefinedMesh& refined, st
   if (edge_px > kMinCreasePx && lateral_ && away_m < crease.reach_m &&
       longest_m > std::max(crease.least_m, kCreaseFrac * away_m)) {
     error_k = std::max(error_k, kCreaseTolerances * tolerance_k_);
+  }
+  // Halve what is wide beside its distance from a hot part.
+  if (smooth && patch.entity < 0 && !hot_.empty()) {
+    count_in(missed_heat_k(corners_m, patch.samples[newest].normal), 1.0F);
   }
   // Look for edges of shadows, on both faces of a sheet. Rays come last because they are expensive.
   if (edge_px >= kEdgeSunPx) {

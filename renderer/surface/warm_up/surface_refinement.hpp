@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "surface/model/drive_sensitivity.hpp"
+#include "surface/rays/hot_parts.hpp"
 #include "surface/rays/interval_rays.hpp"
 #include "surface/warm_up/surface_bend.hpp"
 #include "surface/warm_up/surface_patch.hpp"
@@ -94,6 +95,10 @@ class SurfaceRefinement {
   /// count in which the corners agree that the sun shone or that it did not.
   [[nodiscard]] float missed_shade_k(const RefinedMesh& refined, std::uint32_t slot,
                                      const SurfacePatch& patch) const;
+  /// Greatest error, K, from the radiation of hot parts of entities that corners far apart do not
+  /// meet.
+  [[nodiscard]] float missed_heat_k(const std::array<glm::vec3, 3>& corners_m,
+                                    const glm::vec3& normal) const;
   /// Returns true if the edge of a shadow of static geometry will run through the triangle at the
   /// instant of a planned frame.
   [[nodiscard]] bool shadow_edge_comes(const RefinedMesh& refined, std::uint32_t slot,
@@ -119,6 +124,8 @@ class SurfaceRefinement {
     float reach_m = 0.0F;
   };
   std::vector<CreaseSize> crease_sizes_;  ///< by material
+  HotParts hot_;                          ///< empty without exchange
+  std::vector<std::size_t> hot_since_;    ///< intervals from which on they stand as they do
   std::size_t recent_ = 0;                ///< first interval that counts as recent
   std::vector<IntervalRays> coming_;      ///< rays to the sun at the instants of planned frames
   /// Judgement of a leaf: the node of the mesh that was judged, and its need.

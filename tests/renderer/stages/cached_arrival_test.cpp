@@ -194,6 +194,31 @@ TEST(RendererCachedArrival, AHotPartOfAnEntityWarmsTheGroundAsSceneryDoes) {
   EXPECT_NEAR(ground_k(true, 1, kAwayM, 1200), warm_k, 0.1 + 0.03 * (warm_k - cold_k));
 }
 
+TEST(RendererCachedArrival, WideTrianglesFindAHotPartBetweenTheirCorners) {
+  // Two triangles of 60 m are the ground, and a plate at 800 K hangs over the middle of one. By
+  // night nothing else is a reason to halve them.
+  const auto ground_k = [](double tolerance_k, bool on) {
+    scene::ScenarioDesc s = night();
+    s.thermal.tolerance_k = tolerance_k;
+    scene::Material hot = s.materials[0];
+    hot.name = "plate";
+    hot.prescribed_k = 800.0;
+    s.materials.push_back(hot);
+    scene::ObjectDesc plate = s.objects.front();
+    plate.name = plate.material = "plate";
+    plate.gltf = write_quads(
+        "plate_down", {{{-0.5, -0.5, 1.5}, {-0.5, 0.5, 1.5}, {0.5, 0.5, 1.5}, {0.5, -0.5, 1.5}}});
+    plate.entity_id = 7;
+    s.objects.push_back(plate);
+    stays(s, on ? glm::dvec3(9.3, -7.7, 0.0) : glm::dvec3(-25.0, 25.0, 0.0));
+    return seen_k(s, {-2.0, -19.0, 9.0}, {9.3, -6.9, 0.0}, kShownNs - kSecondNs);
+  };
+  const double cold_k = ground_k(2.0, false);
+  const double fine_k = ground_k(0.2, true);
+  EXPECT_GT(fine_k, cold_k + 2.0);
+  EXPECT_NEAR(ground_k(2.0, true), fine_k, 0.1 * (fine_k - cold_k));
+}
+
 TEST(RendererCachedArrival, AHotBodyThatComesWarmsOneThatStandsThere) {
   scene::ScenarioDesc s = night();
   add_box(s, 7);
