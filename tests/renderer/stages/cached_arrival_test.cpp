@@ -3,6 +3,7 @@
 // move is compared with one that starts with everything in its last place.
 #include <gtest/gtest.h>
 
+#include <cstdio>
 #include <string>
 #include <vector>
 
@@ -195,9 +196,9 @@ TEST(RendererCachedArrival, AHotPartOfAnEntityWarmsTheGroundAsSceneryDoes) {
 }
 
 TEST(RendererCachedArrival, WideTrianglesFindAHotPartBetweenTheirCorners) {
-  // Two triangles of 60 m are the ground, and a plate at 800 K hangs over the middle of one. By
-  // night nothing else is a reason to halve them.
-  const auto ground_k = [](double tolerance_k, bool on) {
+  // Two triangles of 60 m are the ground, and a plate at 800 K hangs over one of them. By night
+  // nothing else is a reason to halve them.
+  const auto ground_k = [](double tolerance_k, const glm::dvec3& plate_m, const glm::dvec3& at_m) {
     scene::ScenarioDesc s = night();
     s.thermal.tolerance_k = tolerance_k;
     scene::Material hot = s.materials[0];
@@ -210,13 +211,23 @@ TEST(RendererCachedArrival, WideTrianglesFindAHotPartBetweenTheirCorners) {
         "plate_down", {{{-0.5, -0.5, 1.5}, {-0.5, 0.5, 1.5}, {0.5, 0.5, 1.5}, {0.5, -0.5, 1.5}}});
     plate.entity_id = 7;
     s.objects.push_back(plate);
-    stays(s, on ? glm::dvec3(9.3, -7.7, 0.0) : glm::dvec3(-25.0, 25.0, 0.0));
-    return seen_k(s, {-2.0, -19.0, 9.0}, {9.3, -6.9, 0.0}, kShownNs - kSecondNs);
+    stays(s, plate_m);
+    Session run(s);
+    (void)run.frame_k(kShownNs, looking(at_m + glm::dvec3(-40.0, -60.0, 40.0), at_m));
+    const auto sample = run.renderer().nearest_sample({at_m, glm::dvec3(0.0, 0.0, 1.0)});
+    EXPECT_TRUE(sample.has_value());
+    return sample ? run.renderer().sample_reading(*sample).temperature_k : 0.0;
   };
-  const double cold_k = ground_k(2.0, false);
-  const double fine_k = ground_k(0.2, true);
-  EXPECT_GT(fine_k, cold_k + 2.0);
-  EXPECT_NEAR(ground_k(2.0, true), fine_k, 0.1 * (fine_k - cold_k));
+  for (const glm::dvec3& plate_m : {glm::dvec3(9.3, -7.7, 0.0), glm::dvec3(-4.1, 12.9, 0.0),
+                                    glm::dvec3(17.7, 3.2, 0.0), glm::dvec3(-13.4, -9.6, 0.0)}) {
+    SCOPED_TRACE(plate_m.x);
+    const double cold_k = ground_k(2.0, {-27.0, 27.0, 0.0}, plate_m);
+    const double fine_k = ground_k(0.2, plate_m, plate_m);
+    const double coarse_k = ground_k(2.0, plate_m, plate_m);
+    std::printf("cold %.2f K, fine %.2f K, coarse %.2f K\n", cold_k, fine_k, coarse_k);
+    EXPECT_GT(fine_k, cold_k + 20.0);
+    EXPECT_NEAR(coarse_k, fine_k, 0.15 * (fine_k - cold_k));
+  }
 }
 
 TEST(RendererCachedArrival, AHotBodyThatComesWarmsOneThatStandsThere) {
